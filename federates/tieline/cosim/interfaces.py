@@ -1,0 +1,153 @@
+"""What crosses the border between the federates: names, clock, bundles and the participant's shape."""
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from tieline.errors import CosimError
+from tieline.units import Seconds, tick_ns
+
+GRID = "grid"
+NETWORK = "network"
+FEDERATES = (GRID, NETWORK)
+ENDPOINTS = {GRID: "grid/bundle", NETWORK: "network/bundle"}
+LAG_NS = {NETWORK: 1_000, GRID: 2_000}
+"""How long after t_k a federate is granted: the network first, then the grid that waits for it."""
+
+DELIVERY = np.dtype(
+    [
+        ("arrival_ns", "<i8"),
+        ("source", "<u2"),
+        ("destination", "<u2"),
+        ("sequence", "<u4"),
+        ("payload", "<u4"),
+    ]
+)
+"""One packet handed to its controller; `payload` is a row of the bundle's payload table."""
+
+_FRAMES = np.dtype([("magic", "S4"), ("at_ns", "<i8"), ("count", "<u4"), ("size_bytes", "<u4")])
+_DELIVERIES = np.dtype(
+    [("magic", "S4"), ("at_ns", "<i8"), ("count", "<u4"), ("size_bytes", "<u4"), ("records", "<u4")]
+)
+
+
+class FederationSettings(BaseModel):
+    """How the federates meet."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    core: Literal["zmq", "tcp", "inproc", "local"] = Field(
+        "zmq",
+        description="HELICS core; inproc keeps both federates in one process, local leaves HELICS out",
+    )
+    start_timeout: Seconds = Field(30.0, gt=0, description="longest wait for a federate to join, s")
+    hang_timeout: Seconds = Field(
+        8.0, gt=0, description="longest wall time without a grant before a federate counts as hung, s"
+    )
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The instants t_k = k / rate at which the federates meet, as whole nanoseconds."""
+
+    rate_hz: int
+    intervals: int
+
+    def at_ns(self, k: int) -> int:
+        """Return t_k."""
+        return tick_ns(k, self.rate_hz)
+
+
+class Participant(Protocol):
+    """One federate seen from the federation: bytes in, bytes out, once an interval."""
+
+    name: str
+
+    def start(self) -> bytes:
+        """Return the message that the other federate holds at t_0."""
+
+    def advance(self, k: int, received: bytes) -> bytes:
+        """Return the message for the other federate after [t_k, t_k+1], given what came for it."""
+
+    def finish(self) -> None:
+        """Write what is left to write; the federation has reached its end."""
+
+    def abort(self, reason: str) -> None:
+        """Save what there is; the federation ends early."""
+
+
+@dataclass(frozen=True)
+class FrameBundle:
+    """The frames measured at one instant: `payloads` (n, size) uint8, row i from source i."""
+
+    measured_ns: int
+    payloads: NDArray[np.uint8]
+
+    def to_bytes(self) -> bytes:
+        """Return the bundle as one message."""
+        head = np.array([(b"TLF1", self.measured_ns, *self.payloads.shape)], dtype=_FRAMES)
+        return head.tobytes() + self.payloads.tobytes()
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> "FrameBundle":
+        """Return the bundle that a message holds.
+
+        Raises:
+            CosimError: the message is no frame bundle.
+        """
+        head = _head(data, _FRAMES, b"TLF1")
+        count, size = int(head["count"]), int(head["size_bytes"])
+        _check_length(data, _FRAMES.itemsize + count * size)
+        payloads = np.frombuffer(data, np.uint8, count * size, _FRAMES.itemsize)
+        return cls(int(head["at_ns"]), payloads.reshape(count, size))
+
+
+@dataclass(frozen=True)
+class DeliveryBundle:
+    """What arrives up to an instant: `records` (m,) of `DELIVERY`, `payloads` (n, size) uint8.
+
+    The records are in the total order (arrival_ns, source, sequence, destination). A payload that
+    reaches many controllers unchanged stands in the table once.
+    """
+
+    until_ns: int
+    records: NDArray[np.void]
+    payloads: NDArray[np.uint8]
+
+    def to_bytes(self) -> bytes:
+        """Return the bundle as one message."""
+        shape = (*self.payloads.shape, len(self.records))
+        head = np.array([(b"TLD1", self.until_ns, *shape)], dtype=_DELIVERIES)
+        return head.tobytes() + self.payloads.tobytes() + self.records.tobytes()
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> "DeliveryBundle":
+        """Return the bundle that a message holds.
+
+        Raises:
+            CosimError: the message is no delivery bundle, or a record names a payload it lacks.
+        """
+        head = _head(data, _DELIVERIES, b"TLD1")
+        count, size, records = (int(head[key]) for key in ("count", "size_bytes", "records"))
+        start = _DELIVERIES.itemsize + count * size
+        _check_length(data, start + records * DELIVERY.itemsize)
+        payloads = np.frombuffer(data, np.uint8, count * size, _DELIVERIES.itemsize)
+        table = np.frombuffer(data, DELIVERY, records, start)
+        if records and int(table["payload"].max()) >= count:
+            raise CosimError(f"a delivery names payload {table['payload'].max()} of {count}")
+        return cls(int(head["at_ns"]), table, payloads.reshape(count, size))
+
+
+def _head(data: bytes, layout: "np.dtype[np.void]", magic: bytes) -> np.void:
+    if len(data) < layout.itemsize or data[:4] != magic:
+        raise CosimError(f"expected a {magic.decode()} bundle, got {len(data)} bytes {data[:8]!r}")
+    head: np.void = np.frombuffer(data, layout, 1)[0]
+    return head
+
+
+def _check_length(data: bytes, expected: int) -> None:
+    if len(data) != expected:
+        raise CosimError(f"a bundle of {expected} bytes came with {len(data)}")
