@@ -1,0 +1,1 @@
+"""The grid: cases, power flow, device models, integration and the grid federate."""

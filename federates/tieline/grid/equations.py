@@ -1,0 +1,102 @@
+"""The right-hand side of the whole system: sources, network, sensors, controls, machines."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tieline.compiled import compiled
+from tieline.grid.loads import correct
+from tieline.grid.models.base import SIGNALS
+from tieline.grid.network import solve
+from tieline.grid.plan import HELD, SENSORS, Average, Jobs, Plan, Work
+from tieline.grid.sensors import Sensors, filter_angles
+
+Floats = NDArray[np.float64]
+
+OMEGA, V_RE, V_IM, VT = (SIGNALS.index(name) for name in ("omega", "v_re", "v_im", "vt"))
+EPP_RE, EPP_IM, WBAR = (SIGNALS.index(name) for name in ("Epp_re", "Epp_im", "wbar"))
+
+V_TOLERANCE_PU = 1e-12
+"""Largest change of a voltage in the last sweep of the load currents. A sweep shrinks the error
+about tenfold, so that what is left is a tenth of this: 1e-13, near the rounding of the solution."""
+MAX_SWEEPS = 60
+
+
+@compiled
+def run_job(functions: Any, jobs: Jobs, work: Work, j: int, x: Floats, dx: Floats) -> None:
+    """Evaluate job `j`: gather its inputs, call its equation, scatter its outputs."""
+    n, states, rows = jobs.n[j], jobs.n_states[j], jobs.n_parameters[j]
+    first_in, last_in = jobs.inputs_at[j], jobs.inputs_at[j + 1]
+    first_out, last_out = jobs.outputs_at[j], jobs.outputs_at[j + 1]
+    units = jobs.units[jobs.units_at[j] : jobs.units_at[j + 1]]
+    u = work.u[: (last_in - first_in) * n].reshape(last_in - first_in, n)
+    y = work.y[: (last_out - first_out) * n].reshape(last_out - first_out, n)
+    x_j = x[jobs.x0[j] : jobs.x0[j] + states * n].reshape(states, n)
+    dx_j = dx[jobs.x0[j] : jobs.x0[j] + states * n].reshape(states, n)
+    p_j = jobs.parameters[jobs.p0[j] : jobs.p0[j] + rows * n].reshape(rows, n)
+    for i in range(last_in - first_in):
+        u[i] = work.signals[jobs.inputs[first_in + i]][units]
+    functions[jobs.function[j]](x_j, u, p_j, dx_j, y)
+    for i in range(last_out - first_out):
+        row = work.signals[jobs.outputs[first_out + i]]
+        row[units] = y[i]
+
+
+@compiled
+def solve_network(plan: Plan, work: Work) -> bool:
+    """Write all bus voltages for the machines' sources; return whether the loads converged."""
+    signals, source = work.signals, work.source
+    source[:] = 0.0
+    for i in range(len(plan.unit_bus)):
+        inner = complex(signals[EPP_RE, i], signals[EPP_IM, i])
+        source[plan.unit_bus[i]] += plan.unit_admittance[i] * inner
+    converged = False
+    for _ in range(MAX_SWEEPS):
+        work.current[:] = source
+        correct(plan.loads, work.v, work.current)
+        before = work.v[plan.loads.bus]
+        solve(plan.factors, work.current, work.scratch, work.v)
+        change = work.v[plan.loads.bus] - before
+        if not (np.abs(change.real) > V_TOLERANCE_PU).any() and not (
+            np.abs(change.imag) > V_TOLERANCE_PU
+        ).any():
+            converged = True
+            break
+    at_units = work.v[plan.unit_bus]
+    signals[V_RE] = at_units.real
+    signals[V_IM] = at_units.imag
+    signals[VT] = np.sqrt(at_units.real**2 + at_units.imag**2)
+    return converged
+
+
+@compiled
+def average_now(average: Average, sensors: Sensors, x: Floats) -> float:
+    """Return wbar as the states of `x` give it, pu; exactly 1 at rest."""
+    total = 0.0
+    if average.mode == SENSORS:
+        z2 = sensors.x0 + len(sensors.bus)
+        for k in range(len(sensors.bus)):
+            total += average.weight[k] * x[z2 + k]
+        return 1.0 + total / (2.0 * np.pi * sensors.f0_Hz)
+    for k in range(len(average.omega)):
+        total += average.weight[k] * (x[average.omega[k]] - 1.0)
+    return 1.0 + total
+
+
+@compiled
+def rhs(functions: Any, plan: Plan, work: Work, x: Floats, dx: Floats) -> bool:
+    """Write dx/dt and every signal at `x`; return whether the network was solved.
+
+    wbar is formed here only when it is neither held nor delayed; else the row stands as it is.
+    """
+    jobs = plan.jobs
+    for j in range(jobs.before_network):
+        run_job(functions, jobs, work, j, x, dx)
+    solved = solve_network(plan, work)
+    filter_angles(plan.sensors, work.v, x, dx)
+    if plan.average.mode != HELD and plan.average.delay_steps == 0:
+        work.signals[WBAR] = average_now(plan.average, plan.sensors, x)
+    for j in range(jobs.before_network, len(jobs.function)):
+        run_job(functions, jobs, work, j, x, dx)
+    return solved

@@ -1,0 +1,1 @@
+"""Device models: equations, parameters and sources, one model a file."""

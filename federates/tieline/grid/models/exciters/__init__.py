@@ -1,0 +1,1 @@
+"""Excitation systems, one model a file."""

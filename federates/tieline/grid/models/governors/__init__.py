@@ -1,0 +1,1 @@
+"""Turbine governors, one model a file."""

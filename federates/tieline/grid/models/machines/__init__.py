@@ -1,0 +1,1 @@
+"""Synchronous machines, one model a file."""

@@ -1,0 +1,160 @@
+"""The subtransient synchronous machine, round rotor and salient pole alike, without saturation."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tieline.compiled import compiled
+from tieline.grid.models.base import Array, Equation, Machine, Parameter, indices
+
+PARAMETERS = (
+    Parameter("H", "s", "inertia constant", above=0),
+    Parameter("D", "pu", "damping torque per speed deviation", at_least=0),
+    Parameter("ra", "pu", "armature resistance", at_least=0),
+    Parameter("xl", "pu", "leakage reactance", at_least=0),
+    Parameter("xd", "pu", "direct-axis synchronous reactance", above=0),
+    Parameter("xd_p", "pu", "direct-axis transient reactance", above=0),
+    Parameter("xd_pp", "pu", "direct-axis subtransient reactance", above=0),
+    Parameter("Td0_p", "s", "direct-axis transient open-circuit time constant", above=0),
+    Parameter("Td0_pp", "s", "direct-axis subtransient open-circuit time constant", above=0),
+    Parameter("xq", "pu", "quadrature-axis synchronous reactance", above=0),
+    Parameter("xq_p", "pu", "quadrature-axis transient reactance", above=0),
+    Parameter("xq_pp", "pu", "quadrature-axis subtransient reactance; equals xd_pp", above=0),
+    Parameter("Tq0_p", "s", "quadrature-axis transient open-circuit time constant", above=0),
+    Parameter("Tq0_pp", "s", "quadrature-axis subtransient open-circuit time constant", above=0),
+)
+STATES = ("delta", "omega", "Eq_p", "psi_kd", "Ed_p", "psi_kq")
+
+P = indices(PARAMETERS)
+X = indices(STATES)
+
+
+@compiled
+def _fluxes(x: Array, p: Array) -> tuple[Array, Array]:
+    """Return psi''_d and psi''_q."""
+    share_d = (p[P.xd_pp] - p[P.xl]) / (p[P.xd_p] - p[P.xl])
+    share_q = (p[P.xq_pp] - p[P.xl]) / (p[P.xq_p] - p[P.xl])
+    psi_d = share_d * x[X.Eq_p] + (1.0 - share_d) * x[X.psi_kd]
+    psi_q = share_q * x[X.Ed_p] + (1.0 - share_q) * x[X.psi_kq]
+    return psi_d, psi_q
+
+
+@compiled
+def _currents(x: Array, u: Array, p: Array, psi_d: Array, psi_q: Array) -> tuple[Array, Array]:
+    """Return i_d and i_q, given the terminal voltage in the first two rows of `u`."""
+    sin, cos = np.sin(x[X.delta]), np.cos(x[X.delta])
+    d_d = -x[X.omega] * psi_q - (sin * u[0] - cos * u[1])
+    d_q = x[X.omega] * psi_d - (cos * u[0] + sin * u[1])
+    ra, xpp = p[P.ra], p[P.xd_pp]
+    square = ra * ra + xpp * xpp
+    return (ra * d_d + xpp * d_q) / square, (ra * d_q - xpp * d_d) / square
+
+
+@compiled
+def _field_current(x: Array, p: Array, i_d: Array) -> Array:
+    """Return I_fd = E'_q + (x_d - x'_d) [i_d + (x'_d - x'') / (x'_d - x_l)^2 e_a]."""
+    span = p[P.xd_p] - p[P.xl]
+    e_a = x[X.Eq_p] - x[X.psi_kd] - span * i_d
+    return x[X.Eq_p] + (p[P.xd] - p[P.xd_p]) * (i_d + (p[P.xd_p] - p[P.xd_pp]) / (span * span) * e_a)
+
+
+def norton(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
+    """Write E'' = omega [(psi''_d cos - psi''_q sin) + j (psi''_q cos + psi''_d sin)], omega, delta."""
+    psi_d, psi_q = _fluxes(x, p)
+    sin, cos = np.sin(x[X.delta]), np.cos(x[X.delta])
+    y[0] = x[X.omega] * (psi_d * cos - psi_q * sin)
+    y[1] = x[X.omega] * (psi_q * cos + psi_d * sin)
+    y[2] = x[X.omega]
+    y[3] = x[X.delta]
+
+
+def electrical(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
+    """Write terminal power and field current."""
+    psi_d, psi_q = _fluxes(x, p)
+    i_d, i_q = _currents(x, u, p, psi_d, psi_q)
+    sin, cos = np.sin(x[X.delta]), np.cos(x[X.delta])
+    y[0] = (sin * u[0] - cos * u[1]) * i_d + (cos * u[0] + sin * u[1]) * i_q
+    y[1] = _field_current(x, p, i_d)
+
+
+def motion(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
+    """Write the derivatives of rotor and fluxes (equations in the class docstring)."""
+    psi_d, psi_q = _fluxes(x, p)
+    i_d, i_q = _currents(x, u, p, psi_d, psi_q)
+    Efd, Pm, w_s = u[2], u[3], u[4]
+    span_q = p[P.xq_p] - p[P.xl]
+    e_b = x[X.Ed_p] - x[X.psi_kq] - span_q * i_q
+    torque = psi_d * i_q - psi_q * i_d
+    dx[X.delta] = w_s * (x[X.omega] - 1.0)
+    dx[X.omega] = (Pm / x[X.omega] - torque - p[P.D] * (x[X.omega] - 1.0)) / (2.0 * p[P.H])
+    dx[X.Eq_p] = (Efd - _field_current(x, p, i_d)) / p[P.Td0_p]
+    dx[X.psi_kd] = (x[X.Eq_p] - x[X.psi_kd] - (p[P.xd_p] - p[P.xl]) * i_d) / p[P.Td0_pp]
+    drop_q = i_q + (p[P.xq_p] - p[P.xq_pp]) / (span_q * span_q) * e_b
+    dx[X.Ed_p] = (-x[X.Ed_p] - (p[P.xq] - p[P.xq_p]) * drop_q) / p[P.Tq0_p]
+    dx[X.psi_kq] = e_b / p[P.Tq0_pp]
+
+
+class Subtransient(Machine):
+    """A machine with field and damper on the d axis and two dampers on the q axis.
+
+        T'_d0  dE'_q/dt   = E_fd - I_fd                    e_a = E'_q - psi_kd - (x'_d - x_l) i_d
+        T''_d0 dpsi_kd/dt = e_a                            e_b = E'_d - psi_kq - (x'_q - x_l) i_q
+        T'_q0  dE'_d/dt   = -E'_d - (x_q - x'_q) [i_q + (x'_q - x'') / (x'_q - x_l)^2 e_b]
+        T''_q0 dpsi_kq/dt = e_b
+        T_e = psi''_d i_q - psi''_q i_d
+        2 H domega/dt = P_m / omega - T_e - D (omega - 1)          ddelta/dt = w_s (omega - 1)
+
+    Current out of the machine is positive. E'_d carries the sign that makes both axes look alike.
+    Speed multiplies the subtransient flux, so that the terminal voltage feels the frequency.
+    Not modelled: saturation, unequal subtransient reactances, stator transients.
+    """
+
+    key = "subtransient"
+    source = "Kundur, Power System Stability and Control, 1994, sections 3.4 to 3.6 and 13.3"
+    parameters = PARAMETERS
+    states = STATES
+    norton = Equation(norton, (), ("Epp_re", "Epp_im", "omega", "delta"))
+    equations = (
+        Equation(electrical, ("v_re", "v_im"), ("Pe", "Ifd")),
+        Equation(motion, ("v_re", "v_im", "Efd", "Pm", "w_s"), ()),
+    )
+
+    @classmethod
+    def check(cls, values: Mapping[str, float]) -> list[str]:
+        """Return what contradicts x_l < x'' <= x' <= x on either axis, or x''_q = x''_d."""
+        wrong = []
+        for axis in "dq":
+            names = ("xl", f"x{axis}_pp", f"x{axis}_p", f"x{axis}")
+            leak, sub, transient, synchronous = (values[name] for name in names)
+            if not leak < sub <= transient <= synchronous:
+                given = ", ".join(f"{name} = {values[name]:g}" for name in names)
+                wrong.append(f"needs {' < '.join(names[:2])} <= {' <= '.join(names[2:])} (got {given})")
+        if values["xq_pp"] != values["xd_pp"]:
+            wrong.append(f"needs xq_pp = xd_pp (got {values['xq_pp']:g} and {values['xd_pp']:g})")
+        return wrong
+
+    @classmethod
+    def impedance(cls, p: Array) -> NDArray[np.complex128]:
+        """Return (n,) r_a + j x''."""
+        return p[P.ra] + 1j * p[P.xd_pp]
+
+    @classmethod
+    def initialise(cls, signals: dict[str, Array], p: Array) -> Array:
+        """Return the states at rest, from terminal voltage and current (`i_re`, `i_im`)."""
+        v = signals["v_re"] + 1j * signals["v_im"]
+        i = signals["i_re"] + 1j * signals["i_im"]
+        delta = np.angle(v + (p[P.ra] + 1j * p[P.xq]) * i)
+        to_dq = 1j * np.exp(-1j * delta)
+        i_d, i_q = (to_dq * i).real, (to_dq * i).imag
+        v_q = (to_dq * v).imag
+        x = np.zeros((len(STATES), len(delta)))
+        x[X.delta] = delta
+        x[X.omega] = 1.0
+        x[X.Eq_p] = v_q + p[P.ra] * i_q + p[P.xd_p] * i_d
+        x[X.psi_kd] = x[X.Eq_p] - (p[P.xd_p] - p[P.xl]) * i_d
+        x[X.Ed_p] = -(p[P.xq] - p[P.xq_p]) * i_q
+        x[X.psi_kq] = x[X.Ed_p] - (p[P.xq_p] - p[P.xl]) * i_q
+        signals["Efd"][:] = x[X.Eq_p] + (p[P.xd] - p[P.xd_p]) * i_d
+        signals["Pm"][:] = (v * i.conj()).real + p[P.ra] * np.abs(i) ** 2
+        return x

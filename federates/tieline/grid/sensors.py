@@ -1,0 +1,48 @@
+"""The PMUs' frequency estimator: a derivative filter on the angle of a bus voltage.
+
+    theta ->[ b s / (s^2 + a1 s + b) ]-> 2 pi (f - f0)
+
+Realised with z1' = z2 and z2' = b (theta - z1) - a1 z2, whose z2 is the output. As only
+theta - z1 enters, a small angle, wrapping it to (-pi, pi] unwraps the bus angle without memory.
+Source: the miniWECC's frequency sensors (PSTess 1.1, by R. Elliott).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tieline.compiled import compiled
+
+Floats = NDArray[np.float64]
+
+A1 = 28.8394098913241
+B = 277.237187626600
+
+
+class Sensors(NamedTuple):
+    """The sensors' buses (m,), the place of their states in x and the system frequency, Hz."""
+
+    bus: NDArray[np.int64]
+    x0: int
+    f0_Hz: float
+
+
+@compiled
+def filter_angles(sensors: Sensors, v: NDArray[np.complex128], x: Floats, dx: Floats) -> None:
+    """Write the derivatives of the filters' states (2, m) from the bus voltages."""
+    count = len(sensors.bus)
+    z1 = x[sensors.x0 : sensors.x0 + count]
+    z2 = x[sensors.x0 + count : sensors.x0 + 2 * count]
+    phasor = v[sensors.bus]
+    gap = np.arctan2(phasor.imag, phasor.real) - z1
+    gap = gap - 2.0 * np.pi * np.floor(gap / (2.0 * np.pi) + 0.5)
+    dx[sensors.x0 : sensors.x0 + count] = z2
+    dx[sensors.x0 + count : sensors.x0 + 2 * count] = B * gap - A1 * z2
+
+
+@compiled
+def frequencies(sensors: Sensors, x: Floats) -> Floats:
+    """Return (m,) the frequencies that the sensors show, Hz."""
+    count = len(sensors.bus)
+    return sensors.f0_Hz + x[sensors.x0 + count : sensors.x0 + 2 * count] / (2.0 * np.pi)

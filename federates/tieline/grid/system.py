@@ -1,0 +1,216 @@
+"""A case at an operating point, assembled for integration: states, signals and the plan."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sparse
+from numpy.typing import NDArray
+
+from tieline.grid.case import Case
+from tieline.grid.devices import Group, groups
+from tieline.grid.equations import rhs
+from tieline.grid.initialise import initial_states, require_rest
+from tieline.grid.loads import load_currents, nominal_admittance
+from tieline.grid.models.base import SIGNALS, Equation, Machine, Model, first_class
+from tieline.grid.network import admittance, factorise
+from tieline.grid.plan import ROTORS, SENSORS, Average, Jobs, Plan, Work
+from tieline.grid.powerflow import PowerFlow
+from tieline.grid.sensors import Sensors
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class System:
+    """A case ready to integrate.
+
+    Attributes:
+        functions: the compiled equations that the plan's jobs name.
+        x0: (n,) states at rest, named by `labels` such as `omega.G1` or `z2.B61`.
+        work: signals and voltages at rest.
+        sensor_bus: (sensors,) bus indices.
+    """
+
+    case: Case
+    flow: PowerFlow
+    groups: tuple[Group, ...]
+    functions: tuple[Any, ...]
+    plan: Plan
+    x0: Floats
+    labels: tuple[str, ...]
+    work: Work
+    sensor_bus: Integers
+
+    def admittance_matrix(self, is_open: Sequence[int] = ()) -> sparse.csc_matrix:
+        """Return (n, n) bus admittances with nominal loads and machines, some branches open."""
+        diagonal = nominal_admittance(self.case, self.flow)
+        np.add.at(diagonal, self.plan.unit_bus, self.plan.unit_admittance)
+        network = admittance(self.case.buses, self.case.branches, is_open)
+        return (network + sparse.diags(diagonal)).tocsc()
+
+
+def build_system(
+    case: Case,
+    flow: PowerFlow,
+    sensors: Sequence[int],
+    average: Average | None = None,
+    substitute: Mapping[type[Model], type[Model]] | None = None,
+) -> System:
+    """Return the system of a case at its operating point, checked to be at rest.
+
+    Args:
+        case: with the stabilisers of the experiment (`devices.with_pss`).
+        flow: its solved power flow.
+        sensors: bus numbers that carry a PMU.
+        average: how wbar is formed; by default the equal mean of the sensors, undelayed.
+        substitute: models to put in place of others, for experiments with equations.
+
+    Raises:
+        NumericalError: a limit is violated at the start, or the system is not at rest.
+    """
+    found = groups(case, substitute or {})
+    states, signals = initial_states(case, flow, found)
+    x0_of = np.cumsum([0] + [state.size for state in states])
+    sensor_bus = np.array([case.bus_index(number) for number in sensors], np.int64)
+    filters = Sensors(sensor_bus, int(x0_of[-1]), float(case.base.frequency_Hz))
+    angles = np.concatenate([flow.theta[sensor_bus], np.zeros(len(sensor_bus))])
+    jobs, functions = _jobs(found, x0_of)
+    omega = _omega_places(found, x0_of, len(case.units))
+    if average is None:
+        average = sensor_average(np.ones(len(sensors)))
+    diagonal = nominal_admittance(case, flow)
+    machine = _machine_admittance(case, found)
+    np.add.at(diagonal, case.unit_bus, machine)
+    matrix = (admittance(case.buses, case.branches) + sparse.diags(diagonal)).tocsc()
+    plan = Plan(
+        jobs=jobs,
+        unit_bus=case.unit_bus,
+        unit_admittance=machine,
+        factors=factorise(matrix),
+        loads=load_currents(case, flow),
+        sensors=filters,
+        average=average._replace(omega=omega),
+    )
+    system = System(
+        case=case,
+        flow=flow,
+        groups=tuple(found),
+        functions=functions,
+        plan=plan,
+        x0=np.concatenate([*(state.ravel() for state in states), angles]),
+        labels=_labels(case, found, sensors),
+        work=_work(flow, signals, jobs),
+        sensor_bus=sensor_bus,
+    )
+    dx = np.zeros_like(system.x0)
+    rhs(system.functions, plan, system.work, system.x0, dx)
+    require_rest(dx, system.labels)
+    return system
+
+
+def sensor_average(weights: Floats, delay_steps: int = 0, mode: int = SENSORS) -> Average:
+    """Return the weighted mean of the sensors, formed at every step and `delay_steps` late."""
+    return Average(mode, weights / weights.sum(), np.zeros(0, np.int64), delay_steps)
+
+
+def rotor_average(weights: Floats, delay_steps: int = 0) -> Average:
+    """Return the weighted mean of the rotor speeds, one weight a unit."""
+    return sensor_average(weights, delay_steps, ROTORS)
+
+
+def _schedule(found: Sequence[Group]) -> tuple[list[tuple[int, Equation]], int]:
+    """Return (group, equation) in the order of evaluation, and how many precede the network."""
+    machines = [(at, g.model) for at, g in enumerate(found) if issubclass(g.model, Machine)]
+    sources = [(at, model.norton) for at, model in machines]
+    terminals = [(at, eq) for at, model in machines for eq in model.equations[:-1]]
+    controls = [
+        (at, equation)
+        for role in ("pss", "exciter", "governor")
+        for at, group in enumerate(found)
+        if group.role == role
+        for equation in group.model.equations
+    ]
+    motions = [(at, model.equations[-1]) for at, model in machines]
+    return [*sources, *terminals, *controls, *motions], len(sources)
+
+
+def _jobs(found: Sequence[Group], x0_of: Integers) -> tuple[Jobs, tuple[Any, ...]]:
+    schedule, before_network = _schedule(found)
+    functions: list[Callable[..., None]] = []
+    for _, equation in schedule:
+        if equation.function not in functions:
+            functions.append(equation.function)
+    of = [found[at] for at, _ in schedule]
+    p0_of = np.cumsum([0] + [group.p.size for group in found])
+
+    def ragged(rows: list[list[int]]) -> tuple[Integers, Integers]:
+        starts = np.cumsum([0] + [len(row) for row in rows])
+        return starts.astype(np.int64), np.array([i for row in rows for i in row], np.int64)
+
+    units_at, units = ragged([group.units.tolist() for group in of])
+    inputs_at, inputs = ragged([[SIGNALS.index(n) for n in eq.inputs] for _, eq in schedule])
+    outputs_at, outputs = ragged([[SIGNALS.index(n) for n in eq.outputs] for _, eq in schedule])
+    whole = lambda values: np.array(list(values), np.int64)  # noqa: E731
+    jobs = Jobs(
+        function=whole(functions.index(eq.function) for _, eq in schedule),
+        n=whole(len(group.units) for group in of),
+        n_states=whole(len(group.model.states) for group in of),
+        n_parameters=whole(len(group.model.parameters) for group in of),
+        x0=whole(x0_of[at] for at, _ in schedule),
+        p0=whole(p0_of[at] for at, _ in schedule),
+        units_at=units_at,
+        units=units,
+        inputs_at=inputs_at,
+        inputs=inputs,
+        outputs_at=outputs_at,
+        outputs=outputs,
+        before_network=before_network,
+        parameters=np.concatenate([group.p.ravel() for group in found]),
+    )
+    return jobs, tuple(first_class(function) for function in functions)
+
+
+def _machine_admittance(case: Case, found: Sequence[Group]) -> NDArray[np.complex128]:
+    result = np.zeros(len(case.units), np.complex128)
+    for group in found:
+        if issubclass(group.model, Machine):
+            rating = case.unit_MVA[group.units] / case.base.base_MVA
+            result[group.units] = rating / group.model.impedance(group.p)
+    return result
+
+
+def _omega_places(found: Sequence[Group], x0_of: Integers, units: int) -> Integers:
+    places = np.zeros(units, np.int64)
+    for at, group in enumerate(found):
+        if issubclass(group.model, Machine):
+            row = group.model.states.index("omega")
+            n = len(group.units)
+            places[group.units] = x0_of[at] + row * n + np.arange(n)
+    return places
+
+
+def _labels(case: Case, found: Sequence[Group], sensors: Sequence[int]) -> tuple[str, ...]:
+    names = [
+        f"{state}.{case.units[unit]}" if group.role == "machine" else f"{group.role}.{state}.{case.units[unit]}"
+        for group in found
+        for state in group.model.states
+        for unit in group.units
+    ]
+    return (*names, *(f"{state}.B{bus}" for state in ("z1", "z2") for bus in sensors))
+
+
+def _work(flow: PowerFlow, signals: Floats, jobs: Jobs) -> Work:
+    largest = int(max(jobs.n)) * (len(SIGNALS) + 1)
+    count = len(flow.v)
+    return Work(
+        signals=signals,
+        v=flow.phasor,
+        current=np.zeros(count, np.complex128),
+        source=np.zeros(count, np.complex128),
+        scratch=np.zeros(count, np.complex128),
+        u=np.zeros(largest),
+        y=np.zeros(largest),
+    )
