@@ -257,14 +257,14 @@ def _branches(folder: Path, index: Mapping[int, int], findings: Findings) -> Bra
         end=np.array([_bus_of(row, "to_bus", index, findings) for row in rows], np.int64),
         impedance=impedance,
         susceptance=values["susceptance_pu"],
-        tap=values["tap_ratio"] * np.exp(1j * np.deg2rad(values["phase_shift_deg"])),
+        tap=np.asarray(
+            values["tap_ratio"] * np.exp(1j * np.deg2rad(values["phase_shift_deg"])), np.complex128
+        ),
         kind=tuple(row.cells["kind"] for row in rows),
     )
 
 
-def _loads(
-    folder: Path, index: Mapping[int, int], buses: Buses, findings: Findings
-) -> Loads:
+def _loads(folder: Path, index: Mapping[int, int], buses: Buses, findings: Findings) -> Loads:
     rows = read_rows(
         folder / "load.csv", ("bus", *_LOAD_SHARES), ("kind", "note"), findings, must_exist=False
     )
@@ -276,7 +276,9 @@ def _loads(
         for letter in "pq":
             parts = [shares[f"{letter}_constant_{what}"][position] for what in ("power", "current")]
             if min(parts) < 0 or math.fsum(parts) > 1:
-                findings.add(row.where, f"shares of {letter} must be >= 0 and sum to <= 1 (got {parts})")
+                findings.add(
+                    row.where, f"shares of {letter} must be >= 0 and sum to <= 1 (got {parts})"
+                )
         if buses.p_load[bus[position]] == 0 == buses.q_load[bus[position]]:
             findings.add(row.where, f"bus {row.cells['bus']} has no load in bus.csv")
     return Loads(bus, **shares)

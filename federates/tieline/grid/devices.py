@@ -1,4 +1,4 @@
-"""Which device stands where in one experiment: the case's tables with the experiment's stabilisers."""
+"""Which device stands where: the case's tables with the experiment's stabilisers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tieline.compiled import compiled
-from tieline.grid.loads import correct
+from tieline.grid.loads import settle
 from tieline.grid.models.base import SIGNALS
 from tieline.grid.network import solve
 from tieline.grid.plan import HELD, SENSORS, Average, Jobs, Plan, Work
@@ -16,11 +16,6 @@ Floats = NDArray[np.float64]
 
 OMEGA, V_RE, V_IM, VT = (SIGNALS.index(name) for name in ("omega", "v_re", "v_im", "vt"))
 EPP_RE, EPP_IM, WBAR = (SIGNALS.index(name) for name in ("Epp_re", "Epp_im", "wbar"))
-
-V_TOLERANCE_PU = 1e-12
-"""Largest change of a voltage in the last sweep of the load currents. A sweep shrinks the error
-about tenfold, so that what is left is a tenth of this: 1e-13, near the rounding of the solution."""
-MAX_SWEEPS = 60
 
 
 @compiled
@@ -36,37 +31,28 @@ def run_job(functions: Any, jobs: Jobs, work: Work, j: int, x: Floats, dx: Float
     dx_j = dx[jobs.x0[j] : jobs.x0[j] + states * n].reshape(states, n)
     p_j = jobs.parameters[jobs.p0[j] : jobs.p0[j] + rows * n].reshape(rows, n)
     for i in range(last_in - first_in):
-        u[i] = work.signals[jobs.inputs[first_in + i]][units]
+        for unit in range(n):
+            u[i, unit] = work.signals[jobs.inputs[first_in + i], units[unit]]
     functions[jobs.function[j]](x_j, u, p_j, dx_j, y)
     for i in range(last_out - first_out):
-        row = work.signals[jobs.outputs[first_out + i]]
-        row[units] = y[i]
+        for unit in range(n):
+            work.signals[jobs.outputs[first_out + i], units[unit]] = y[i, unit]
 
 
 @compiled
 def solve_network(plan: Plan, work: Work) -> bool:
     """Write all bus voltages for the machines' sources; return whether the loads converged."""
-    signals, source = work.signals, work.source
-    source[:] = 0.0
+    signals = work.signals
+    work.source[:] = 0.0
     for i in range(len(plan.unit_bus)):
         inner = complex(signals[EPP_RE, i], signals[EPP_IM, i])
-        source[plan.unit_bus[i]] += plan.unit_admittance[i] * inner
-    converged = False
-    for _ in range(MAX_SWEEPS):
-        work.current[:] = source
-        correct(plan.loads, work.v, work.current)
-        before = work.v[plan.loads.bus]
-        solve(plan.factors, work.current, work.scratch, work.v)
-        change = work.v[plan.loads.bus] - before
-        if not (np.abs(change.real) > V_TOLERANCE_PU).any() and not (
-            np.abs(change.imag) > V_TOLERANCE_PU
-        ).any():
-            converged = True
-            break
-    at_units = work.v[plan.unit_bus]
-    signals[V_RE] = at_units.real
-    signals[V_IM] = at_units.imag
-    signals[VT] = np.sqrt(at_units.real**2 + at_units.imag**2)
+        work.source[plan.unit_bus[i]] += plan.unit_admittance[i] * inner
+    solve(plan.factors, work.source, work.scratch, work.v_open)
+    converged = settle(plan.loads, plan.load_transfer, work.v_open, work.v, work.source)
+    solve(plan.factors, work.source, work.scratch, work.v)
+    for i in range(len(plan.unit_bus)):
+        v = work.v[plan.unit_bus[i]]
+        signals[V_RE, i], signals[V_IM, i], signals[VT, i] = v.real, v.imag, abs(v)
     return converged
 
 
@@ -90,13 +76,12 @@ def rhs(functions: Any, plan: Plan, work: Work, x: Floats, dx: Floats) -> bool:
 
     wbar is formed here only when it is neither held nor delayed; else the row stands as it is.
     """
-    jobs = plan.jobs
-    for j in range(jobs.before_network):
-        run_job(functions, jobs, work, j, x, dx)
-    solved = solve_network(plan, work)
-    filter_angles(plan.sensors, work.v, x, dx)
-    if plan.average.mode != HELD and plan.average.delay_steps == 0:
-        work.signals[WBAR] = average_now(plan.average, plan.sensors, x)
-    for j in range(jobs.before_network, len(jobs.function)):
-        run_job(functions, jobs, work, j, x, dx)
+    solved = True
+    for j in range(len(plan.jobs.function)):
+        if j == plan.jobs.before_network:
+            solved = solve_network(plan, work)
+            filter_angles(plan.sensors, work.v, x, dx)
+            if plan.average.mode != HELD and plan.average.delay_steps == 0:
+                work.signals[WBAR] = average_now(plan.average, plan.sensors, x)
+        run_job(functions, plan.jobs, work, j, x, dx)
     return solved

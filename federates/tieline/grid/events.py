@@ -41,7 +41,9 @@ def plan_events(case: Case, settings: GridSettings) -> list[Switching]:
             findings.append(f"{where}: branch {name} is open already")
         is_open |= rows
         findings += _dead_islands(case, where, is_open)
-        units = _lone_units(case, is_open) - {unit for earlier in switched for unit in earlier.units}
+        units = _lone_units(case, is_open) - {
+            unit for earlier in switched for unit in earlier.units
+        }
         switched.append(Switching(tick, tuple(sorted(rows)), tuple(sorted(units))))
     if findings:
         raise InputError(findings)

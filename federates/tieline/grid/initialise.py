@@ -9,7 +9,7 @@ from tieline.errors import NumericalError
 from tieline.grid.case import Case
 from tieline.grid.devices import Group
 from tieline.grid.models.base import SIGNALS
-from tieline.grid.models.limits import OutsideLimit
+from tieline.grid.models.limits import OutsideLimitError
 from tieline.grid.powerflow import PowerFlow
 
 Floats = NDArray[np.float64]
@@ -41,7 +41,7 @@ def initial_states(
         local |= {"i_re": current.real[group.units], "i_im": current.imag[group.units]}
         try:
             states.append(np.ascontiguousarray(group.model.initialise(local, group.p)))
-        except OutsideLimit as error:
+        except OutsideLimitError as error:
             unit = case.units[group.units[error.position]]
             raise NumericalError(f"{group.model.key} of '{unit}': {error}") from error
         for name, row in named.items():

@@ -3,7 +3,7 @@
 Source: Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.1.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,30 @@ from tieline.grid.plan import HELD, Plan, Work
 
 Floats = NDArray[np.float64]
 
-HEUN, RK4 = 0, 1
-METHODS = {"heun": HEUN, "rk4": RK4}
+
+class Tableau(NamedTuple):
+    """An explicit Runge-Kutta method whose stages fall on half steps.
+
+    Attributes:
+        a: (stages, stages) weights of earlier stages; b: (stages,) weights of the step.
+        half: (stages,) instant of each stage in half steps.
+    """
+
+    a: Floats
+    b: Floats
+    half: NDArray[np.int64]
+
+
+METHODS = {
+    "heun": Tableau(
+        a=np.array([[0.0, 0.0], [1.0, 0.0]]), b=np.array([0.5, 0.5]), half=np.array([0, 2])
+    ),
+    "rk4": Tableau(
+        a=np.array([[0, 0, 0, 0], [0.5, 0, 0, 0], [0, 0.5, 0, 0], [0, 0, 1.0, 0]]),
+        b=np.array([1 / 6, 1 / 3, 1 / 3, 1 / 6]),
+        half=np.array([0, 1, 1, 2]),
+    ),
+}
 
 DONE, NO_NETWORK_SOLUTION, NOT_FINITE = 0, 1, 2
 
@@ -41,23 +63,6 @@ def late_average(history: Floats, tick: int, delay: int, half: int) -> float:
 
 
 @compiled
-def stage(
-    functions: Any,
-    plan: Plan,
-    work: Work,
-    history: Floats,
-    tick: int,
-    half: int,
-    x: Floats,
-    dx: Floats,
-) -> bool:
-    """Evaluate the right-hand side `half` half steps after `tick`."""
-    if plan.average.mode != HELD and plan.average.delay_steps > 0:
-        work.signals[WBAR] = late_average(history, tick, plan.average.delay_steps, half)
-    return rhs(functions, plan, work, x, dx)
-
-
-@compiled
 def advance(
     functions: Any,
     plan: Plan,
@@ -68,38 +73,37 @@ def advance(
     tick: int,
     steps: int,
     h: float,
-    method: int,
+    method: Tableau,
 ) -> tuple[int, int]:
     """Integrate `x` in place over `steps` steps of `h` seconds from `tick`.
 
     Args:
         functions, plan, work: the system.
         history: ring of past averages, indexed by tick; holds the delay and a margin.
-        x: states (n,); k: scratch (5, n).
-        tick, steps, h, method: where it starts, how far, step in s, `HEUN` or `RK4`.
+        x: states (n,); k: scratch (stages + 1, n).
+        tick, steps, h, method: where it starts, how far, step in s, tableau.
 
     Returns:
         The tick reached and `DONE`, or the tick of the step that failed and why.
     """
-    ring = len(history)
+    is_late = plan.average.mode != HELD and plan.average.delay_steps > 0
+    stages = len(method.b)
+    at_stage = k[stages]
     for now in range(tick, tick + steps):
-        solved = stage(functions, plan, work, history, now, 0, x, k[0])
-        if method == HEUN:
-            k[4] = x + h * k[0]
-            solved &= stage(functions, plan, work, history, now, 2, k[4], k[1])
-            x += (0.5 * h) * (k[0] + k[1])
-        else:
-            k[4] = x + (0.5 * h) * k[0]
-            solved &= stage(functions, plan, work, history, now, 1, k[4], k[1])
-            k[4] = x + (0.5 * h) * k[1]
-            solved &= stage(functions, plan, work, history, now, 1, k[4], k[2])
-            k[4] = x + h * k[2]
-            solved &= stage(functions, plan, work, history, now, 2, k[4], k[3])
-            x += (h / 6.0) * (k[0] + 2.0 * (k[1] + k[2]) + k[3])
+        for stage in range(stages):
+            at_stage[:] = x
+            for earlier in range(stage):
+                if method.a[stage, earlier] != 0.0:
+                    at_stage += (h * method.a[stage, earlier]) * k[earlier]
+            if is_late:
+                delay = plan.average.delay_steps
+                work.signals[WBAR] = late_average(history, now, delay, method.half[stage])
+            if not rhs(functions, plan, work, at_stage, k[stage]):
+                return now, NO_NETWORK_SOLUTION
+        for stage in range(stages):
+            x += (h * method.b[stage]) * k[stage]
         if not np.isfinite(x).all():
             return now, NOT_FINITE
-        if not solved:
-            return now, NO_NETWORK_SOLUTION
         if plan.average.mode != HELD:
-            history[(now + 1) % ring] = average_now(plan.average, plan.sensors, x)
+            history[(now + 1) % len(history)] = average_now(plan.average, plan.sensors, x)
     return tick + steps, DONE

@@ -66,6 +66,7 @@ class Plan(NamedTuple):
 
     Attributes:
         unit_bus: (units,) bus index; unit_admittance: (units,) Norton admittance, system base.
+        load_transfer: (loads, loads) voltages for unit currents, of these factors.
     """
 
     jobs: Jobs
@@ -73,6 +74,7 @@ class Plan(NamedTuple):
     unit_admittance: Complexes
     factors: Factors
     loads: LoadCurrents
+    load_transfer: Complexes
     sensors: Sensors
     average: Average
 
@@ -82,7 +84,7 @@ class Work(NamedTuple):
 
     signals: Floats
     v: Complexes
-    current: Complexes
+    v_open: Complexes
     source: Complexes
     scratch: Complexes
     u: Floats

@@ -15,6 +15,7 @@ from tieline.grid.case import Case
 from tieline.grid.network import admittance
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 TOLERANCE_PU = 1e-10
 """Largest power mismatch. Newton's last step squares the error, so it ends far below this."""
@@ -65,7 +66,9 @@ def solve_power_flow(case: Case, *, max_iterations: int = 30) -> PowerFlow:
             break
         if abs(mismatch[worst]) < TOLERANCE_PU:
             s_gen = excess + scheduled + buses.p_load + 1j * buses.q_load
-            flow = PowerFlow(v, theta, s_gen.real, s_gen.imag, iteration, float(abs(mismatch[worst])))
+            flow = PowerFlow(
+                v, theta, s_gen.real, s_gen.imag, iteration, float(abs(mismatch[worst]))
+            )
             _check_reactive_limits(case, flow)
             return flow
         step = spsolve(_jacobian(y, phasor, free_angle, free_v), -mismatch)
@@ -79,7 +82,7 @@ def solve_power_flow(case: Case, *, max_iterations: int = 30) -> PowerFlow:
 
 
 def _jacobian(
-    y: sparse.csr_matrix, phasor: NDArray[np.complex128], free_angle: Floats, free_v: Floats
+    y: sparse.csr_matrix, phasor: NDArray[np.complex128], free_angle: Integers, free_v: Integers
 ) -> sparse.csc_matrix:
     """Return d(P, Q)/d(theta, V), with dS/dtheta = j V (I - Y V)* and dS/dV = V (Y e)* + I* e."""
     v = sparse.diags(phasor)

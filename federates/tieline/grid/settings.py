@@ -21,10 +21,15 @@ class PssSettings(_Strict):
     gain: StrictFloat | None = Field(
         None, ge=0, description="gain K, pu on the machine's base; none takes the case's own"
     )
-    beta1: StrictFloat = Field(1.0, ge=0, le=1, description="share of the speed against the average")
-    beta2: StrictFloat = Field(1.0, ge=0, le=1, description="share of the average against synchronous")
+    beta1: StrictFloat = Field(
+        1.0, ge=0, le=1, description="share of the speed against the average"
+    )
+    beta2: StrictFloat = Field(
+        1.0, ge=0, le=1, description="share of the average against synchronous"
+    )
     average: Literal["sensors", "rotors"] = Field(
-        "sensors", description="wbar from PMU frequencies, or from the true rotor speeds (undelayed)"
+        "sensors",
+        description="wbar from PMU frequencies, or from the true rotor speeds (undelayed)",
     )
     units: Literal["all"] | list[str] = Field(
         "all", description="units whose stabiliser is in service, by name (G1, G2, ...)"
@@ -42,7 +47,9 @@ class TripBranch(_Strict):
     """A branch opens at both ends."""
 
     at: Seconds = Field(ge=0, description="instant of the event, s")
-    trip_branch: str = Field(description="FROM-TO bus numbers, with #N for the Nth parallel circuit")
+    trip_branch: str = Field(
+        description="FROM-TO bus numbers, with #N for the Nth parallel circuit"
+    )
 
 
 _KINDS = ("trip_generator", "trip_branch")

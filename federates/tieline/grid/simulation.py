@@ -16,6 +16,7 @@ from tieline.grid.integrate import (
     NO_NETWORK_SOLUTION,
     advance,
 )
+from tieline.grid.loads import load_transfer
 from tieline.grid.models.base import SIGNALS
 from tieline.grid.network import factorise
 from tieline.grid.plan import ROTORS
@@ -42,8 +43,8 @@ class Reading:
 class Grid:
     """A system that is integrated step by step.
 
-    Time is a whole number of steps, `tick`; no float time is ever compared. Events happen at the
-    start of their tick: the voltages jump, the states do not.
+    Time is a whole number of steps, `tick`; no float time is ever compared. What is
+    observed at the tick of an event is observed after it: voltages have jumped, states have not.
     """
 
     def __init__(
@@ -66,10 +67,11 @@ class Grid:
             signals=system.work.signals.copy(), v=system.work.v.copy()
         )
         self._x = system.x0.copy()
-        self._k = np.zeros((5, len(self._x)))
+        self._k = np.zeros((len(self._method.b) + 1, len(self._x)))
         self._history = np.ones(self._plan.average.delay_steps + HISTORY_MARGIN)
         self._inertia = system.case.unit_MVA * _inertia(system)
         self._is_current = False
+        self._apply_due()
 
     @property
     def x(self) -> Floats:
@@ -82,7 +84,7 @@ class Grid:
         self._is_current = False
 
     def advance(self, to_tick: int) -> None:
-        """Integrate up to a tick, with the events on the way; those at `to_tick` itself wait.
+        """Integrate up to a tick, with the events on the way and those at `to_tick` itself.
 
         Raises:
             NumericalError: a state is no longer finite or the network has no solution; names the
@@ -91,10 +93,8 @@ class Grid:
         if to_tick < self.tick:
             raise ValueError(f"tick {to_tick} lies before the current one, {self.tick}")
         while self.tick < to_tick:
-            while self._pending and self._pending[0].tick <= self.tick:
-                self._apply(self._pending.pop(0))
-            stop = min([to_tick, *(event.tick for event in self._pending[:1])])
-            self._run(stop)
+            self._run(min([to_tick, *(event.tick for event in self._pending[:1])]))
+            self._apply_due()
 
     def _run(self, to_tick: int) -> None:
         self._is_current = False
@@ -120,9 +120,16 @@ class Grid:
             lowest = int(np.argmin(np.abs(self._work.v)))
             bus = self.system.case.buses.number[lowest]
             size = abs(self._work.v[lowest])
-            return f"the load currents did not converge {when}; lowest voltage {size:.3g} pu at bus {bus}"
+            return (
+                f"the load currents did not converge {when}; "
+                f"lowest voltage {size:.3g} pu at bus {bus}"
+            )
         bad = int(np.flatnonzero(~np.isfinite(self._x))[0])
         return f"{self.system.labels[bad]} is not finite {when}"
+
+    def _apply_due(self) -> None:
+        while self._pending and self._pending[0].tick <= self.tick:
+            self._apply(self._pending.pop(0))
 
     def _apply(self, event: Switching) -> None:
         self._is_open |= set(event.branches)
@@ -132,7 +139,12 @@ class Grid:
         if average.mode == ROTORS and event.units:
             weight = np.where(self.in_service, average.weight, 0.0)
             average = average._replace(weight=weight / weight.sum())
-        self._plan = self._plan._replace(factors=factorise(matrix), average=average)
+        factors = factorise(matrix)
+        self._plan = self._plan._replace(
+            factors=factors,
+            load_transfer=load_transfer(factors, self._plan.loads),
+            average=average,
+        )
         self._is_current = False
 
     def _refresh(self) -> None:

@@ -12,7 +12,7 @@ from tieline.grid.case import Case
 from tieline.grid.devices import Group, groups
 from tieline.grid.equations import rhs
 from tieline.grid.initialise import initial_states, require_rest
-from tieline.grid.loads import load_currents, nominal_admittance
+from tieline.grid.loads import load_currents, load_transfer, nominal_admittance
 from tieline.grid.models.base import SIGNALS, Equation, Machine, Model, first_class
 from tieline.grid.network import admittance, factorise
 from tieline.grid.plan import ROTORS, SENSORS, Average, Jobs, Plan, Work
@@ -85,12 +85,14 @@ def build_system(
     machine = _machine_admittance(case, found)
     np.add.at(diagonal, case.unit_bus, machine)
     matrix = (admittance(case.buses, case.branches) + sparse.diags(diagonal)).tocsc()
+    factors, loads = factorise(matrix), load_currents(case, flow)
     plan = Plan(
         jobs=jobs,
         unit_bus=case.unit_bus,
         unit_admittance=machine,
-        factors=factorise(matrix),
-        loads=load_currents(case, flow),
+        factors=factors,
+        loads=loads,
+        load_transfer=load_transfer(factors, loads),
         sensors=filters,
         average=average._replace(omega=omega),
     )
@@ -194,7 +196,9 @@ def _omega_places(found: Sequence[Group], x0_of: Integers, units: int) -> Intege
 
 def _labels(case: Case, found: Sequence[Group], sensors: Sequence[int]) -> tuple[str, ...]:
     names = [
-        f"{state}.{case.units[unit]}" if group.role == "machine" else f"{group.role}.{state}.{case.units[unit]}"
+        f"{state}.{case.units[unit]}"
+        if group.role == "machine"
+        else f"{group.role}.{state}.{case.units[unit]}"
         for group in found
         for state in group.model.states
         for unit in group.units
@@ -208,7 +212,7 @@ def _work(flow: PowerFlow, signals: Floats, jobs: Jobs) -> Work:
     return Work(
         signals=signals,
         v=flow.phasor,
-        current=np.zeros(count, np.complex128),
+        v_open=flow.phasor,
         source=np.zeros(count, np.complex128),
         scratch=np.zeros(count, np.complex128),
         u=np.zeros(largest),

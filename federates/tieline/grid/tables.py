@@ -53,7 +53,10 @@ class Findings:
         text = row.cells.get(column, "").strip()
         if text in allowed:
             return text
-        self.add(row.where, f"'{column}' must be one of {', '.join(allowed)} (got {text!r}{near(text, allowed)})")
+        self.add(
+            row.where,
+            f"'{column}' must be one of {', '.join(allowed)} (got {text!r}{near(text, allowed)})",
+        )
         return allowed[0]
 
     def known(self, where: str, what: str, given: object, allowed: Sequence[object]) -> bool:
@@ -119,7 +122,9 @@ def read_rows(
     return rows
 
 
-def unique(rows: Sequence[Row], key: Callable[[Row], object], what: str, findings: Findings) -> None:
+def unique(
+    rows: Sequence[Row], key: Callable[[Row], object], what: str, findings: Findings
+) -> None:
     """Note every row whose key stands in an earlier row."""
     seen: dict[object, str] = {}
     for row in rows:

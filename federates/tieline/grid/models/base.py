@@ -146,9 +146,9 @@ class Machine(Model):
 
 
 def indices(names: Sequence[str] | Sequence[Parameter]) -> Any:
-    """Return a named tuple that gives each name its row, so that `P.KA` is a compile-time number."""
+    """Return a named tuple that gives each name its row: `P.KA` is a compile-time number."""
     words = [name.symbol if isinstance(name, Parameter) else name for name in names]
-    return namedtuple("Rows", words)(*range(len(words)))  # noqa: PYI024
+    return namedtuple("Rows", words)(*range(len(words)))
 
 
 @cache

@@ -14,9 +14,9 @@ from tieline.grid.models.base import Array
 def washout(u: Array, x: Array, T: Array) -> tuple[Array, Array]:
     """Return output and derivative of s T / (1 + s T).
 
-        u --->(+)---> y         dx/dt = y / T
-             - ^
-               x <--[1/(s T)]-- y
+    u --->(+)---> y         dx/dt = y / T
+         - ^
+           x <--[1/(s T)]-- y
     """
     y = u - x
     return y, y / T

@@ -5,7 +5,7 @@ import numpy as np
 from tieline.grid.models.base import Array
 
 
-class OutsideLimit(ValueError):
+class OutsideLimitError(ValueError):
     """An operating point violates a limit of one unit of a group.
 
     Attributes:
@@ -21,9 +21,11 @@ def require_within(name: str, value: Array, low: Array | float, high: Array | fl
     """Raise for the first unit whose `value` (n,) lies outside [low, high].
 
     Raises:
-        OutsideLimit: it does; the message gives the value and both limits.
+        OutsideLimitError: it does; the message gives the value and both limits.
     """
     low, high = np.broadcast_to(low, value.shape), np.broadcast_to(high, value.shape)
     for position in np.flatnonzero((value < low) | (value > high)):
         given, least, most = value[position], low[position], high[position]
-        raise OutsideLimit(int(position), f"{name} = {given:.4g} at the start, outside [{least:g}, {most:g}]")
+        raise OutsideLimitError(
+            int(position), f"{name} = {given:.4g} at the start, outside [{least:g}, {most:g}]"
+        )

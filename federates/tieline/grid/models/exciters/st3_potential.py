@@ -36,9 +36,9 @@ def equations(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
 class ST3Potential(Model):
     """A regulator that drives a bridge fed by the terminal voltage.
 
-        V_ref -(+)->[VImin, VImax]->[(1+sTC)/(1+sTB)]->[KA/(1+sTA) in VRmin..VRmax]->(x)->[Efdmax]-> E_fd
-             - ^ +                                                                    ^
-           V_t   v_s                                                             KP |V_t|
+        V_ref ->(+)->[VImin..VImax]->[(1+sTC)/(1+sTB)]->[KA/(1+sTA)]->(x)->[..Efdmax]-> E_fd
+               - ^ +                                      VRmin..VRmax  ^
+             V_t   v_s                                              KP |V_t|
 
     Not modelled, because the case's constants are zero: transducer lag, inner field-voltage loop
     (K_M, K_G), current source (K_I), source reactance (X_L) and rectifier loading (K_C).
@@ -46,7 +46,10 @@ class ST3Potential(Model):
 
     key = "st3_potential"
     role = "exciter"
-    source = "IEEE Std 421.5-2016, type ST3C and its predecessor ST3A, with K_I = K_C = K_G = X_L = T_R = 0"
+    source = (
+        "IEEE Std 421.5-2016, type ST3C and its predecessor ST3A, "
+        "with K_I = K_C = K_G = X_L = T_R = 0"
+    )
     parameters = PARAMETERS
     states = STATES
     equations = (Equation(equations, ("vt", "v_s", "Vref"), ("Efd",)),)

@@ -56,11 +56,17 @@ def _field_current(x: Array, p: Array, i_d: Array) -> Array:
     """Return I_fd = E'_q + (x_d - x'_d) [i_d + (x'_d - x'') / (x'_d - x_l)^2 e_a]."""
     span = p[P.xd_p] - p[P.xl]
     e_a = x[X.Eq_p] - x[X.psi_kd] - span * i_d
-    return x[X.Eq_p] + (p[P.xd] - p[P.xd_p]) * (i_d + (p[P.xd_p] - p[P.xd_pp]) / (span * span) * e_a)
+    return x[X.Eq_p] + (p[P.xd] - p[P.xd_p]) * (
+        i_d + (p[P.xd_p] - p[P.xd_pp]) / (span * span) * e_a
+    )
 
 
 def norton(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
-    """Write E'' = omega [(psi''_d cos - psi''_q sin) + j (psi''_q cos + psi''_d sin)], omega, delta."""
+    """Write the voltage E'' behind the subtransient impedance, speed and angle.
+
+    E'' = omega [(psi''_d cos delta - psi''_q sin delta)
+                 + j (psi''_q cos delta + psi''_d sin delta)]
+    """
     psi_d, psi_q = _fluxes(x, p)
     sin, cos = np.sin(x[X.delta]), np.cos(x[X.delta])
     y[0] = x[X.omega] * (psi_d * cos - psi_q * sin)
@@ -129,7 +135,9 @@ class Subtransient(Machine):
             leak, sub, transient, synchronous = (values[name] for name in names)
             if not leak < sub <= transient <= synchronous:
                 given = ", ".join(f"{name} = {values[name]:g}" for name in names)
-                wrong.append(f"needs {' < '.join(names[:2])} <= {' <= '.join(names[2:])} (got {given})")
+                wrong.append(
+                    f"needs {' < '.join(names[:2])} <= {' <= '.join(names[2:])} (got {given})"
+                )
         if values["xq_pp"] != values["xd_pp"]:
             wrong.append(f"needs xq_pp = xd_pp (got {values['xq_pp']:g} and {values['xd_pp']:g})")
         return wrong

@@ -8,7 +8,9 @@ from tieline.grid.models.pss import delta_omega
 PARAMETERS = (
     *delta_omega.PARAMETERS,
     Parameter("beta1", "1", "share of the speed against the average", at_least=0, at_most=1),
-    Parameter("beta2", "1", "share of the average against synchronous speed", at_least=0, at_most=1),
+    Parameter(
+        "beta2", "1", "share of the average against synchronous speed", at_least=0, at_most=1
+    ),
 )
 
 P = indices(PARAMETERS)
