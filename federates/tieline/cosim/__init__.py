@@ -1,0 +1,1 @@
+"""The federation: what crosses it, when, and over what; the only package that imports HELICS."""

@@ -1,4 +1,4 @@
-"""What crosses the border between the federates: names, clock, bundles and the participant's shape."""
+"""What crosses the border between the federates: names, clock, bundles, the participant's shape."""
 
 from dataclasses import dataclass
 from typing import Literal, Protocol
@@ -37,15 +37,19 @@ _DELIVERIES = np.dtype(
 class FederationSettings(BaseModel):
     """How the federates meet."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     core: Literal["zmq", "tcp", "inproc", "local"] = Field(
         "zmq",
-        description="HELICS core; inproc keeps both federates in one process, local leaves HELICS out",
+        description=(
+            "HELICS core; inproc keeps both federates in one process, local leaves HELICS out"
+        ),
     )
     start_timeout: Seconds = Field(30.0, gt=0, description="longest wait for a federate to join, s")
     hang_timeout: Seconds = Field(
-        8.0, gt=0, description="longest wall time without a grant before a federate counts as hung, s"
+        8.0,
+        gt=0,
+        description="longest wall time without a grant before a federate counts as hung, s",
     )
 
 

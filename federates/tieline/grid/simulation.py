@@ -15,11 +15,12 @@ from tieline.grid.integrate import (
     METHODS,
     NO_NETWORK_SOLUTION,
     advance,
+    late_average,
 )
 from tieline.grid.loads import load_transfer
 from tieline.grid.models.base import SIGNALS
 from tieline.grid.network import factorise
-from tieline.grid.plan import ROTORS
+from tieline.grid.plan import HELD, ROTORS, Work
 from tieline.grid.sensors import frequencies
 from tieline.grid.system import System
 
@@ -63,11 +64,11 @@ class Grid:
         self._plan = system.plan
         self._pending = sorted(events, key=lambda event: event.tick)
         self._is_open: set[int] = set()
-        self._work = system.work._replace(
-            signals=system.work.signals.copy(), v=system.work.v.copy()
-        )
+        self._work = _copy(system.work)
+        self._view = _copy(system.work)
         self._x = system.x0.copy()
         self._k = np.zeros((len(self._method.b) + 1, len(self._x)))
+        self._dx = np.zeros(len(self._x))
         self._history = np.ones(self._plan.average.delay_steps + HISTORY_MARGIN)
         self._inertia = system.case.unit_MVA * _inertia(system)
         self._is_current = False
@@ -148,34 +149,48 @@ class Grid:
         self._is_current = False
 
     def _refresh(self) -> None:
-        """Bring signals and voltages to the states of this tick."""
-        if not self._is_current:
-            rhs(self.system.functions, self._plan, self._work, self._x, self._k[0])
-            self._is_current = True
+        """Bring the view to the states of this tick; the integration itself is not touched.
+
+        The view works on copies: the load currents start their sweeps from the voltages of the
+        last stage, and looking at a grid must not change where it goes, not even in the last bit.
+        """
+        if self._is_current:
+            return
+        self._view.signals[:] = self._work.signals
+        self._view.v[:] = self._work.v
+        delay = self._plan.average.delay_steps
+        if self._plan.average.mode != HELD and delay > 0:
+            self._view.signals[WBAR] = late_average(self._history, self.tick, delay, 0)
+        rhs(self.system.functions, self._plan, self._view, self._x, self._dx)
+        self._is_current = True
 
     def signal(self, name: str) -> Floats:
         """Return (units,) a signal now, by its name in `models.base.SIGNALS`."""
         self._refresh()
-        return self._work.signals[SIGNALS.index(name)].copy()
+        return self._view.signals[SIGNALS.index(name)].copy()
 
     def voltages(self) -> Complexes:
         """Return (buses,) the bus voltages now, pu."""
         self._refresh()
-        return self._work.v.copy()
+        return self._view.v.copy()
 
     def reading(self) -> Reading:
         """Return what the PMUs measure now."""
         self._refresh()
         sensors = self.system.plan.sensors
         first = sensors.x0 + len(sensors.bus)
-        rocof = self._k[0][first : first + len(sensors.bus)] / (2.0 * np.pi)
-        return Reading(self._work.v[sensors.bus], frequencies(sensors, self._x), rocof)
+        rocof = self._dx[first : first + len(sensors.bus)] / (2.0 * np.pi)
+        return Reading(self._view.v[sensors.bus], frequencies(sensors, self._x), rocof)
 
     def centre_of_inertia(self) -> float:
         """Return the speed of the units in service, weighted by stored energy, pu."""
         omega = self._x[self._plan.average.omega]
         weight = np.where(self.in_service, self._inertia, 0.0)
         return float(1.0 + (weight * (omega - 1.0)).sum() / weight.sum())
+
+
+def _copy(work: Work) -> Work:
+    return Work._make(array.copy() for array in work)
 
 
 def _inertia(system: System) -> Floats:

@@ -1,0 +1,1 @@
+"""The packet network: topology, engines and the federate that carries the frames."""

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictFloat
 
 from tieline.units import Seconds
 
@@ -10,7 +10,7 @@ from tieline.units import Seconds
 class NetworkSettings(BaseModel):
     """The engine that carries the frames, and what the experiment changes of its topology."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     engine: Literal["ideal", "constant", "packet"] = Field(
         "packet",
@@ -31,10 +31,13 @@ class NetworkSettings(BaseModel):
             "none leaves the topology as it is"
         ),
     )
-    loss: float | None = Field(
-        None, ge=0, lt=1, description="loss probability of each link, in place of the topology's own"
+    loss: StrictFloat | None = Field(
+        None,
+        ge=0,
+        lt=1,
+        description="loss probability of each link, in place of the topology's own",
     )
-    cross_traffic: float = Field(
+    cross_traffic: StrictFloat = Field(
         1.0, ge=0, le=20, description="factor on the rate of all cross traffic; 0 turns it off"
     )
-    record_packets: bool = Field(False, description="write packets.parquet, one row a packet")
+    record_packets: StrictBool = Field(False, description="write packets.parquet, one row a packet")

@@ -1,25 +1,25 @@
 """What an experiment says about the phasor measurements and the average made of them."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt
 
 
 class WamsSettings(BaseModel):
     """Reporting, sensors and weights."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    reporting: int | Literal["continuous"] = Field(
+    reporting: Annotated[StrictInt, Field(gt=0, le=240)] | Literal["continuous"] = Field(
         60,
         description=(
             "frames a second of each PMU, or 'continuous': the average is formed at every "
             "integration step and delayed as a whole (engines ideal and constant only)"
         ),
     )
-    sensors: Literal["default"] | list[int] = Field(
+    sensors: Literal["default"] | Annotated[list[StrictInt], Field(min_length=1)] = Field(
         "default", description="bus numbers that carry a PMU, or the case's own list"
     )
-    weights: Literal["equal"] | list[float] = Field(
+    weights: Literal["equal"] | list[Annotated[StrictFloat, Field(ge=0)]] = Field(
         "equal", description="weight of each sensor in wbar; scaled to sum 1"
     )

@@ -1,0 +1,39 @@
+"""The broker as a process of its own: `python -m tieline.cosim.broker CORE PORT`."""
+
+import argparse
+import json
+import signal
+import sys
+
+from tieline.cosim.link import Broker
+from tieline.cosim.process import die_with_launcher
+from tieline.errors import CosimError
+
+_POLL_S = 0.5
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Return the exit code of one federation's broker: 0 once every federate has left."""
+    parser = argparse.ArgumentParser(prog="tieline.cosim.broker", description=__doc__)
+    parser.add_argument("core", choices=["zmq", "tcp"])
+    parser.add_argument("port", type=int)
+    arguments = parser.parse_args(argv)
+    die_with_launcher()
+    # It has nothing to save, and a wait inside HELICS would put off a handler of Python's.
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        broker = Broker(arguments.core, arguments.port)
+    except CosimError as error:
+        sys.stderr.write(f"{error}\n")
+        return error.exit_code
+    line = {"federate": "broker", "state": "running"}
+    sys.stdout.write(json.dumps(line) + "\n")
+    sys.stdout.flush()
+    while not broker.wait(_POLL_S):
+        pass
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

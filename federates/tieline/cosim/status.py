@@ -1,0 +1,90 @@
+"""What a federate says about itself while it runs: JSON lines, at each change and now and then."""
+
+import json
+import os
+import threading
+import time
+from collections.abc import Iterable
+from typing import Literal
+
+State = Literal["opening", "joining", "running", "finishing", "finished", "failed"]
+Fault = Literal["own", "other"]
+
+_PERIOD_S = 0.25
+
+
+class Status:
+    """The state of one federate, written as JSON lines to a file descriptor.
+
+    A line holds `federate`, `state`, `k` (interval of the last grant, -1 before the first),
+    `granted_ns` (-1 before the first), `waits` (for a grant), `cpu_s` (of the process) and, once
+    failed, `reason`, `exit_code` and `fault`: `own`, or `other` if the federation ended around it.
+    """
+
+    def __init__(self, federate: str, descriptor: int) -> None:
+        self.federate = federate
+        self.state: State = "opening"
+        self._descriptor = descriptor
+        self._k = -1
+        self._granted_ns = -1
+        self._waits = False
+        self._failure: dict[str, str | int] = {}
+
+    def enter(self, state: State) -> None:
+        """Change the state and say so at once."""
+        self.state = state
+        self.write()
+
+    def wait(self) -> None:
+        """Note that a grant is waited for; the next line tells it."""
+        self._waits = True
+
+    def grant(self, k: int, granted_ns: int) -> None:
+        """Note a grant; the next line tells it."""
+        self._k, self._granted_ns, self._waits = k, granted_ns, False
+
+    def fail(self, reason: str, fault: Fault, exit_code: int) -> None:
+        """Enter `failed`; only the first reason counts."""
+        if not self._failure:
+            self._failure = {"reason": reason, "fault": fault, "exit_code": exit_code}
+            self.enter("failed")
+
+    def write(self) -> None:
+        """Write one line; a reader that is gone is no reason to stop here."""
+        line = {
+            "federate": self.federate,
+            "state": self.state,
+            "k": self._k,
+            "granted_ns": self._granted_ns,
+            "waits": self._waits,
+            "cpu_s": round(time.process_time(), 3),
+            **self._failure,
+        }
+        try:
+            # One write, so that lines of several threads never mix.
+            os.write(self._descriptor, json.dumps(line).encode() + b"\n")
+        except BrokenPipeError:
+            self._descriptor = os.open(os.devnull, os.O_WRONLY)
+
+
+class Heartbeat:
+    """A thread that has every status written each quarter of a second of wall time."""
+
+    def __init__(self, statuses: Iterable[Status]) -> None:
+        self._statuses = tuple(statuses)
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._beat, name="heartbeat", daemon=True)
+
+    def __enter__(self) -> "Heartbeat":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join()
+
+    def _beat(self) -> None:
+        while not self._ended.wait(_PERIOD_S):
+            for status in self._statuses:
+                if status.state not in ("finished", "failed"):
+                    status.write()

@@ -1,0 +1,265 @@
+"""Starts the processes of one run, watches them, and ends every one of them at the first fault."""
+
+import json
+import selectors
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+from tieline.cosim.interfaces import FEDERATES, GRID, NETWORK, FederationSettings
+from tieline.cosim.ports import reserved_port
+from tieline.errors import CosimError, TielineError
+from tieline.experiment.supervise import Child, ProcessUse, end_all
+from tieline.experiment.watch import Progress, Suspect, Watch
+
+BROKER = "broker"
+TOGETHER = "together"
+
+COMMANDS: Mapping[str, Sequence[str]] = {
+    BROKER: (sys.executable, "-m", "tieline.cosim.broker"),
+    GRID: (sys.executable, "-m", "tieline.grid"),
+    NETWORK: (sys.executable, "-m", "tieline.network"),
+    TOGETHER: (sys.executable, "-m", "tieline.cosim.together"),
+}
+"""What starts each process; the run file follows as argument, or core and port for the broker."""
+
+_POLL_S = 0.1
+_SETTLE_S = 0.6
+_LINGER_S = 2.0
+_END_WITHIN_S = 9.5
+_LEAST_GRACE_S = 1.0
+_MOST_GRACE_S = 5.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run went.
+
+    Attributes:
+        wall_s: wall time of the phases `start` (until every federate has joined), `run` and `end`.
+        granted_ns: last time granted to each federate, -1 for none.
+        processes: what each process cost, as far as it had ended by itself or was ended.
+    """
+
+    wall_s: dict[str, float]
+    granted_ns: dict[str, int]
+    processes: tuple[ProcessUse, ...]
+
+
+class FederateFailedError(CosimError):
+    """A run ended early.
+
+    Attributes:
+        federate: the name of the process or federate at fault.
+        outcome: how far the run came.
+        exit_code: that of the federate's own exception where it had one.
+    """
+
+    def __init__(self, suspect: Suspect, outcome: Outcome, tail: Sequence[str]) -> None:
+        lines = [f"{suspect.name}: {suspect.reason}", *(f"  | {line}" for line in tail)]
+        super().__init__("\n".join(lines))
+        self.federate = suspect.name
+        self.reason = suspect.reason
+        self.outcome = outcome
+        self.exit_code = suspect.exit_code
+
+
+def launch(
+    folder: Path,
+    on_progress: Callable[[Progress], None] | None = None,
+    *,
+    commands: Mapping[str, Sequence[str]] | None = None,
+    order: Sequence[str] = FEDERATES,
+    stagger_s: float = 0.0,
+) -> Outcome:
+    """Run the federation of `folder/run.json` to its end and return how it went.
+
+    Args:
+        folder: the run folder; logs go to its `logs/`, the broker's port into its run.json.
+        on_progress: called with every word of a federate about itself.
+        commands: replaces entries of `COMMANDS`.
+        order: which federate is started first.
+        stagger_s: wall time between the two starts, s.
+
+    Raises:
+        FederateFailedError: a process died, failed, hung or never joined; every process is ended by
+            then, and what was written is readable.
+        KeyboardInterrupt: the user ended the run; the same holds.
+    """
+    run_file = folder / "run.json"
+    run = json.loads(run_file.read_text(encoding="utf-8"))
+    settings = _settings(run)
+    table = {**COMMANDS, **(commands or {})}
+    with ExitStack() as stack:
+        stack.enter_context(_termination_as_interrupt())
+        if settings.core in ("inproc", "local"):
+            starts = [(TOGETHER, [*table[TOGETHER], str(run_file)])]
+        else:
+            port = stack.enter_context(reserved_port())
+            _write_port(run_file, run, port)
+            broker = [*table[BROKER], settings.core, str(port)]
+            starts = [(BROKER, broker), *((name, [*table[name], str(run_file)]) for name in order)]
+        return _Launch(folder, settings, on_progress).run(starts, stagger_s)
+
+
+class _Launch:
+    """The processes of one run and what is known of them."""
+
+    def __init__(
+        self,
+        folder: Path,
+        settings: FederationSettings,
+        on_progress: Callable[[Progress], None] | None,
+    ) -> None:
+        self._folder = folder
+        self._on_progress = on_progress
+        self._watch = Watch(settings)
+        self._children: dict[str, Child] = {}
+        self._wall_s: dict[str, float] = {}
+
+    def run(self, starts: Sequence[tuple[str, list[str]]], stagger_s: float) -> Outcome:
+        """Return the outcome once every process has ended well."""
+        began_s = time.monotonic()
+        try:
+            self._start(starts, stagger_s)
+            self._follow(began_s)
+        except BaseException as error:
+            self._end()
+            self._salvage(error)
+            raise
+        return self._outcome()
+
+    def _start(self, starts: Sequence[tuple[str, list[str]]], stagger_s: float) -> None:
+        for name, command in starts:
+            if name in FEDERATES and any(other in FEDERATES for other in self._children):
+                time.sleep(stagger_s)
+            log = self._folder / "logs" / f"{name}.log"
+            try:
+                self._children[name] = Child(name, command, log)
+            except OSError as error:
+                self._fail(Suspect(name, f"could not be started: {error}", CosimError.exit_code))
+
+    def _follow(self, began_s: float) -> None:
+        marks = {"start": began_s}
+        before_s = time.monotonic()
+        while any(child.exit_code is None for child in self._children.values()):
+            self._wait()
+            now_s = time.monotonic()
+            self._watch.pass_time(now_s - before_s)
+            before_s = now_s
+            if self._watch.is_running():
+                marks.setdefault("run", now_s)
+            if self._watch.is_finished():
+                marks.setdefault("end", now_s)
+            self._judge()
+            if self._watch.is_finished() and self._watch.silence_s > _LINGER_S:
+                break
+        self._mark_phases(marks)
+        self._end()
+
+    def _wait(self) -> None:
+        with selectors.DefaultSelector() as selector:
+            for child in self._children.values():
+                for descriptor in child.descriptors:
+                    selector.register(descriptor, selectors.EVENT_READ)
+            selector.select(_POLL_S)
+        # In this order: what the dead have said is then known before they are judged.
+        for child in self._children.values():
+            child.poll()
+        self._hear()
+
+    def _hear(self) -> None:
+        for child in self._children.values():
+            for message in child.read():
+                progress = self._watch.hear(message)
+                if progress is not None and self._on_progress is not None:
+                    self._on_progress(progress)
+
+    def _judge(self) -> None:
+        suspect = self._watch.suspect(self._children)
+        if suspect is None:
+            return
+        limit = time.monotonic() + _SETTLE_S
+        # The first sign is often the victim's: the culprit's own word or death follows it.
+        while not suspect.is_certain and time.monotonic() < limit:
+            self._wait()
+            suspect = self._watch.suspect(self._children)
+            if suspect is None:
+                return
+        self._fail(suspect)
+
+    def _fail(self, suspect: Suspect) -> NoReturn:
+        self._end()
+        child = self._children.get(suspect.name, self._children.get(TOGETHER))
+        tail = () if child is None else tuple(child.log.tail)
+        raise FederateFailedError(suspect, self._outcome(), tail)
+
+    def _end(self) -> None:
+        children = tuple(self._children.values())
+        left_s = _END_WITHIN_S - self._watch.silence_s
+        end_all(children, min(_MOST_GRACE_S, max(_LEAST_GRACE_S, left_s)))
+        self._hear()
+        for child in children:
+            child.close()
+
+    def _outcome(self) -> Outcome:
+        uses = (child.use for child in self._children.values())
+        return Outcome(
+            dict(self._wall_s),
+            self._watch.granted_ns(),
+            tuple(use for use in uses if use is not None),
+        )
+
+    def _mark_phases(self, marks: Mapping[str, float]) -> None:
+        ends = {"start": "run", "run": "end", "end": None}
+        now_s = time.monotonic()
+        for phase, following in ends.items():
+            if phase in marks:
+                until_s = marks.get(following, now_s) if following else now_s
+                self._wall_s[phase] = until_s - marks[phase]
+
+    def _salvage(self, error: BaseException) -> None:
+        from tieline.tables import salvage
+
+        try:
+            salvage(self._folder)
+        except (TielineError, OSError) as second:
+            error.add_note(f"what was written could not be made readable: {second}")
+
+
+def _settings(run: Mapping[str, Any]) -> FederationSettings:
+    stated = {key: value for key, value in run["federation"].items() if key != "broker_port"}
+    return FederationSettings(**stated)
+
+
+def _write_port(run_file: Path, run: dict[str, Any], port: int) -> None:
+    run["federation"] = {**run["federation"], "broker_port": port}
+    part = run_file.with_suffix(".part")
+    part.write_text(json.dumps(run, indent=2) + "\n", encoding="utf-8")
+    part.replace(run_file)
+
+
+@contextmanager
+def _termination_as_interrupt() -> Iterator[None]:
+    """Have SIGTERM end a run as Ctrl-C does; left alone outside the main thread or if handled."""
+    if (
+        threading.current_thread() is not threading.main_thread()
+        or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL
+    ):
+        yield
+        return
+
+    def interrupt(*_: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -1,0 +1,117 @@
+"""Writes the manifest: what a result is, where it came from, and whether it is whole."""
+
+import hashlib
+import importlib.metadata
+import json
+import platform
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tieline
+from tieline.experiment.launch import Outcome
+from tieline.experiment.plan import PlannedRun
+from tieline.experiment.results import FORMAT, MANIFEST, table_hash
+
+STREAMS = "one numpy PCG64 generator a random thing, from the seed and its name (tieline.streams)"
+
+_PACKAGES = ("helics", "numpy", "scipy", "numba", "pandas", "pyarrow", "pydantic", "networkx")
+
+
+def write_json(path: Path, data: object) -> None:
+    """Write a JSON file that appears whole or not at all."""
+    text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
+    part = path.with_name(f".{path.name}.part")
+    part.write_text(text + "\n", encoding="utf-8")
+    part.replace(path)
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of all that a result depends on."""
+    found = {"tieline": tieline.__version__, "python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            found[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            found[package] = "not installed"
+    return found | {"platform": f"{platform.system()} {platform.machine()}"}
+
+
+def run_manifest(
+    planned: PlannedRun, facts: Mapping[str, Any], reason: str | None
+) -> dict[str, Any]:
+    """Return the manifest of one run.
+
+    Args:
+        planned: the run.
+        facts: as `run_facts` returns them; empty while the run is under way.
+        reason: why the run is incomplete, or None when it is whole.
+    """
+    experiment = planned.point.experiment
+    return {
+        "format": FORMAT,
+        "kind": "run",
+        "status": "complete" if reason is None else "incomplete",
+        "reason": reason,
+        "name": experiment.name,
+        "label": planned.point.label,
+        "question": experiment.question,
+        "run_id": planned.run["run_id"],
+        "config": experiment.model_dump(mode="json"),
+        "config_hash": planned.run["config_hash"],
+        "inputs": dict(planned.inputs),
+        "seed": experiment.seed,
+        "random_streams": STREAMS,
+        "clock": planned.run["clock"],
+        "tripped_units": "simulated to the end behind their open branch, and in no average",
+        "versions": versions(),
+        **facts,
+    }
+
+
+def sweep_manifest(runs: tuple[PlannedRun, ...], reason: str | None) -> dict[str, Any]:
+    """Return the manifest of a sweep; each of its points has one of its own."""
+    first = runs[0].point.experiment
+    points = [
+        {
+            "label": run.point.label,
+            "slug": run.point.slug,
+            "run_id": run.run["run_id"],
+            "config_hash": run.run["config_hash"],
+        }
+        for run in runs
+    ]
+    hashes = "".join(point["config_hash"] for point in points)
+    return {
+        "format": FORMAT,
+        "kind": "sweep",
+        "status": "complete" if reason is None else "incomplete",
+        "reason": reason,
+        "name": first.name,
+        "question": first.question,
+        "points": points,
+        "config_hash": hashlib.sha256(hashes.encode()).hexdigest(),
+        "versions": versions(),
+    }
+
+
+def save_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
+    """Write a manifest into its folder."""
+    write_json(folder / MANIFEST, manifest)
+
+
+def run_facts(outcome: Outcome | None, folder: Path) -> dict[str, Any]:
+    """Return what a launch found out (if it got so far) and the content hash of every table."""
+    hashes = {path.name: table_hash(path) for path in sorted(folder.glob("*.parquet"))}
+    if outcome is None:
+        return {"tables": hashes}
+    return {
+        "granted_ns": outcome.granted_ns,
+        "times": {
+            "wall_s": sum(outcome.wall_s.values()),
+            "phases_s": outcome.wall_s,
+            "cpu_s": {use.name: use.cpu_s for use in outcome.processes},
+        },
+        "peak_memory_bytes": {use.name: use.peak_bytes for use in outcome.processes},
+        "tables": hashes,
+    }

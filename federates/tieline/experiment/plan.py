@@ -1,0 +1,143 @@
+"""Checks an experiment against its case and network, and writes out what each run will be told."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tieline.errors import InputError
+from tieline.experiment.load import Study
+from tieline.experiment.problems import near
+from tieline.experiment.schema import Experiment
+from tieline.experiment.sites import Sites, Survey, survey
+from tieline.experiment.sweep import Point
+from tieline.resources import case_folder, shipped
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """One run: its point, the content of its run file, and hashes of the files that it reads."""
+
+    point: Point
+    run: Mapping[str, Any]
+    inputs: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Every run of a study, checked and ready to start."""
+
+    study: Study
+    runs: tuple[PlannedRun, ...]
+
+
+def canonical_json(data: object) -> str:
+    """Return JSON that is the same text for equal data."""
+    return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def config_hash(experiment: Experiment) -> str:
+    """Return the SHA-256 of every setting of an experiment, defaults included."""
+    return hashlib.sha256(canonical_json(experiment.model_dump(mode="json")).encode()).hexdigest()
+
+
+def prepare(study: Study, survey: Survey = survey) -> Plan:
+    """Return the plan of a study, each of its points checked against its case and network.
+
+    Args:
+        study: a checked experiment.
+        survey: checks one point; points that differ in nothing it looks at are checked once.
+
+    Raises:
+        InputError: every finding of every point.
+    """
+    findings: list[str] = []
+    runs: list[PlannedRun] = []
+    known: dict[str, Sites] = {}
+    for point in study.points:
+        try:
+            runs.append(_planned(study, point, survey, known))
+        except InputError as error:
+            findings += [study.located(finding, point) for finding in error.findings]
+    if findings:
+        raise InputError(dict.fromkeys(findings))
+    return Plan(study, tuple(runs))
+
+
+def _planned(study: Study, point: Point, survey: Survey, known: dict[str, Sites]) -> PlannedRun:
+    experiment = point.experiment
+    folder = _case_folder(experiment.case, study.sources.document.path.parent)
+    topology = _topology(experiment, folder, study.sources.document.path.parent)
+    parts = experiment.model_dump(mode="json", include={"grid", "wams", "network"})
+    key = canonical_json([str(folder), parts])
+    if key not in known:
+        known[key] = survey(experiment, folder, topology)
+    sites = known[key]
+    weights = experiment.wams.weights
+    if weights != "equal" and len(weights) != len(sites.sensors):
+        raise InputError(
+            f"wams.weights must have one weight for each of the {len(sites.sensors)} sensors"
+            f" (got {len(weights)})"
+        )
+    inputs = {"case": _folder_hash(folder)}
+    if topology is not None:
+        inputs["topology"] = hashlib.sha256(topology.read_bytes()).hexdigest()
+    return PlannedRun(point, _run_file(point, sites, folder, topology), inputs)
+
+
+def _run_file(point: Point, sites: Sites, folder: Path, topology: Path | None) -> dict[str, Any]:
+    experiment = point.experiment
+    settings = experiment.model_dump(mode="json")
+    digest = config_hash(experiment)
+    return {
+        "run_id": "-".join(filter(None, (experiment.name, point.slug, digest[:8]))),
+        "config_hash": digest,
+        "seed": experiment.seed,
+        "clock": {"rate_hz": experiment.rate_hz, "intervals": experiment.intervals},
+        "federation": settings["federation"],
+        "case": str(folder),
+        "grid": settings["grid"],
+        "wams": settings["wams"],
+        "network": settings["network"] | {"topology": None if topology is None else str(topology)},
+        "sources": sites.sources(),
+        "destinations": sites.destinations(),
+        "frequency_hz": sites.frequency_hz,
+        "tie_mode": sites.tie_mode,
+        "plot_unit": sites.plot_unit,
+    }
+
+
+def _case_folder(name: str, beside: Path) -> Path:
+    """Return the case's folder; a path counts from the experiment's file, or else from here."""
+    local = beside / name
+    if (local / "case.yaml").is_file():
+        return local.resolve()
+    try:
+        return case_folder(name)
+    except InputError as error:
+        known = [path.parent.name for path in shipped("cases").glob("*/case.yaml")]
+        raise InputError(f"case: {error}{near(name, known)}") from error
+
+
+def _topology(experiment: Experiment, folder: Path, beside: Path) -> Path | None:
+    if experiment.network.engine != "packet":
+        return None
+    name = experiment.network.topology
+    places = [folder / "network.yaml"] if name == "case" else [beside / name, Path(name)]
+    for path in places:
+        if path.is_file():
+            return path.resolve()
+    raise InputError(
+        f"network.topology {'of the case' if name == 'case' else repr(name)} is missing:"
+        f" no file {places[0]}"
+    )
+
+
+def _folder_hash(folder: Path) -> str:
+    digest = hashlib.sha256()
+    for path in sorted([*folder.glob("*.csv"), *folder.glob("*.yaml")]):
+        content = path.read_bytes()
+        digest.update(f"{path.name} {len(content)}\n".encode() + content)
+    return digest.hexdigest()

@@ -1,0 +1,265 @@
+"""Draws a result's figures from its folder: frequency, voltage, delays, and what was believed."""
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from tieline.experiment.results import Run
+
+STYLE: Any = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.0,
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "0.9",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.1,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "savefig.dpi": 200,
+}
+COLOURS = ("viridis", 0.12, 0.88)
+"""Sequential and safe for the colour-blind; its palest tenth would be lost on white paper."""
+
+WITHOUT_PACKETS = "black"
+PANEL_INCHES = (6.3, 3.2)
+MOST_BARS = 80
+
+BELIEF_WINDOW_S = (1.0, 11.0)
+"""Before and after the first event, where a late average differs from the true one."""
+
+_DELAY_KEYS = ("engine", "delay", "mean_delay")
+
+
+def draw(folder: Path, runs: Sequence[Run]) -> list[Path]:
+    """Draw the figures of some runs of one experiment into `folder`, and return their files.
+
+    Args:
+        folder: where the PNG files go; made if missing.
+        runs: at least one complete run, in the order of the legend.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    with mpl.rc_context(STYLE):
+        for name, figure in _figures(runs).items():
+            paths.append(folder / f"{name}.png")
+            figure.savefig(paths[-1])
+    return paths
+
+
+def _figures(runs: Sequence[Run]) -> dict[str, Figure]:
+    figures = {"frequency": _alone(frequency, runs), "voltage": _alone(voltage, runs)}
+    if any(len(_counts(run)) for run in runs):
+        figures["delays"] = delay_histograms(runs)
+    if len(runs) == 1 and believing_unit(runs[0]):
+        figures["average"] = _alone(believed_average, runs)
+    figures["overview"] = overview(runs)
+    return figures
+
+
+def frequency(axes: Axes, runs: Sequence[Run]) -> None:
+    """Draw the frequency of the centre of inertia against time, one curve a run."""
+    for run, look in zip(runs, _looks(runs), strict=True):
+        grid = run.table("grid")
+        nominal_hz = float(run.told()["frequency_hz"])
+        axes.plot(grid["t_s"], nominal_hz * grid["coi_pu"], label=run.label, **look)
+    _finish(axes, runs, "system frequency (centre of inertia), Hz")
+    _mark_events(axes, runs[0])
+
+
+def voltage(axes: Axes, runs: Sequence[Run]) -> None:
+    """Draw the terminal voltage of one unit against time, one curve a run."""
+    unit = drawn_unit(runs[0])
+    for run, look in zip(runs, _looks(runs), strict=True):
+        grid = run.table("grid")
+        axes.plot(grid["t_s"], grid[f"vt_pu.{unit}"], label=run.label, **look)
+    _finish(axes, runs, f"terminal voltage of {unit}, pu")
+
+
+def delay_shares(axes: Axes, runs: Sequence[Run]) -> None:
+    """Draw the share of packets that arrived within a delay, one curve a run that sent any."""
+    for run, look in zip(runs, _looks(runs), strict=True):
+        counts = _counts(run)
+        if len(counts):
+            edges = [counts["bin_low_s"].iloc[0], *counts["bin_high_s"]]
+            reached = np.concatenate([[0.0], np.cumsum(counts["count"])]) / counts["count"].sum()
+            axes.plot(edges, 100 * reached, label=run.label, **look)
+    axes.set_xlim(left=0)
+    axes.set_ylim(0, 101)
+    axes.set_xlabel("combined delay, s")
+    axes.set_ylabel("frames arrived within, %")
+
+
+def believed_average(axes: Axes, runs: Sequence[Run]) -> None:
+    """Draw the true centre-of-inertia frequency and what one controller takes it for."""
+    run = runs[0]
+    grid, nominal_hz = run.table("grid"), float(run.told()["frequency_hz"])
+    unit = believing_unit(run)
+    start_s = min((at for at, _ in run.events()), default=0.0)
+    inside = grid["t_s"].between(start_s - BELIEF_WINDOW_S[0], start_s + BELIEF_WINDOW_S[1])
+    time_s = grid["t_s"][inside]
+    axes.plot(
+        time_s, nominal_hz * grid["coi_pu"][inside], color="black", label="true (centre of inertia)"
+    )
+    believed = nominal_hz * grid[f"wbar_pu.{unit}"][inside]
+    axes.plot(time_s, believed, color=mpl.colormaps["viridis"](0.45), label=f"believed by {unit}")
+    axes.set_xlabel("time, s")
+    axes.set_ylabel("average frequency, Hz")
+    axes.margins(x=0)
+    axes.legend()
+
+
+def delay_histograms(runs: Sequence[Run]) -> Figure:
+    """Return a figure with one histogram of the combined delays for each run that sent packets."""
+    sent = [(run, look) for run, look in zip(runs, _looks(runs), strict=True) if len(_counts(run))]
+    columns = min(3, math.ceil(math.sqrt(len(sent))))
+    rows = -(-len(sent) // columns)
+    size = (PANEL_INCHES[0] if columns == 1 else 2.6 * columns, 2.4 * rows + 0.4)
+    figure = Figure(figsize=size, layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes, (run, look) in zip(grid, sent, strict=False):
+        _histogram(axes, run, look["color"])
+    for axes in grid[len(sent) :]:
+        axes.remove()
+    figure.supxlabel("combined delay, ms", fontsize=9.0)
+    figure.supylabel("frames, % per ms", fontsize=9.0)
+    return figure
+
+
+def overview(runs: Sequence[Run]) -> Figure:
+    """Return frequency, voltage and delays in one figure."""
+    has_delays = any(len(_counts(run)) for run in runs)
+    figure = Figure(figsize=(6.3, 6.6 if has_delays else 4.8), layout="constrained")
+    panels = figure.subplots(3 if has_delays else 2, 1)
+    frequency(panels[0], runs)
+    voltage(panels[1], runs)
+    panels[0].set_ylabel("system frequency, Hz")
+    panels[1].set_ylabel(panels[1].get_ylabel().replace("terminal voltage of ", "voltage of "))
+    if panels[1].get_legend():
+        panels[1].get_legend().remove()
+    if has_delays:
+        delay_shares(panels[2], runs)
+    for letter, axes in zip("abc", panels, strict=False):
+        axes.set_title(f"({letter})")
+    return figure
+
+
+def drawn_unit(run: Run) -> str:
+    """Return the unit whose voltage is drawn: the case's, or the one that moves most."""
+    chosen = run.told().get("plot_unit")
+    if chosen:
+        return str(chosen)
+    grid = run.table("grid")
+    lost = {f"vt_pu.{unit}" for unit in run.tripped_units()}
+    columns = [name for name in grid.columns if name.startswith("vt_pu.") and name not in lost]
+    swings = grid[columns].max() - grid[columns].min()
+    return str(swings.idxmax()).removeprefix("vt_pu.")
+
+
+def believing_unit(run: Run) -> str | None:
+    """Return the unit whose belief is drawn: the drawn one if it has a controller."""
+    prefix = "wbar_pu."
+    columns = [name for name in run.table("grid").columns if name.startswith(prefix)]
+    units = [name.removeprefix(prefix) for name in columns]
+    preferred = drawn_unit(run)
+    return preferred if preferred in units else next(iter(units), None)
+
+
+def _alone(panel: Callable[[Axes, Sequence[Run]], None], runs: Sequence[Run]) -> Figure:
+    figure = Figure(figsize=PANEL_INCHES, layout="constrained")
+    panel(figure.subplots(), runs)
+    return figure
+
+
+def _finish(axes: Axes, runs: Sequence[Run], what: str) -> None:
+    axes.set_xlabel("time, s")
+    axes.set_ylabel(what)
+    axes.margins(x=0)
+    axes.ticklabel_format(useOffset=False)
+    if len(runs) > 1:
+        axes.legend(title=_legend_title(runs), title_fontsize=8.0, ncols=2)
+
+
+def _mark_events(axes: Axes, run: Run) -> None:
+    for at_s, text in run.events():
+        axes.axvline(at_s, color="0.6", linewidth=0.8, linestyle=":")
+        axes.annotate(
+            text,
+            (at_s, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(3, -2),
+            textcoords="offset points",
+            va="top",
+            fontsize=8.0,
+            color="0.35",
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
+        )
+
+
+def _looks(runs: Sequence[Run]) -> list[dict[str, Any]]:
+    """Return colour and line of each run: a sequence for those with packets, black without."""
+    name, first, last = COLOURS
+    with_packets = [run for run in runs if len(_counts(run))]
+    places = np.linspace(first, last, max(2, len(with_packets)))
+    colours = iter(mpl.colormaps[name](places))
+    return [
+        {"color": next(colours)}
+        if len(_counts(run))
+        else {"color": WITHOUT_PACKETS, "linestyle": (0, (4, 2)), "zorder": 3}
+        for run in runs
+    ]
+
+
+def _legend_title(runs: Sequence[Run]) -> str | None:
+    """Return what the labels stand for, where the runs differ in nothing but their delay."""
+    others = [
+        (
+            {key: value for key, value in run.config.items() if key not in ("network", "wams")},
+            {key: v for key, v in run.config["network"].items() if key not in _DELAY_KEYS},
+        )
+        for run in runs
+    ]
+    return "mean combined delay" if all(other == others[0] for other in others) else None
+
+
+def _counts(run: Run) -> pd.DataFrame:
+    """Return the histogram of a run's delays between its first and last arrivals."""
+    counts = run.table("delays")
+    if not len(counts) or not counts["count"].any():
+        return counts.iloc[:0]
+    filled = np.flatnonzero(counts["count"])
+    return counts.iloc[filled[0] : filled[-1] + 1]
+
+
+def _histogram(axes: Axes, run: Run, colour: Any) -> None:
+    counts = _counts(run)
+    heights, edges_ms = _rebinned(counts)
+    share = 100 * heights / heights.sum() / np.diff(edges_ms)
+    axes.stairs(share, edges_ms, fill=True, color=colour)
+    delay = run.summary()["delay"]
+    mean_ms, p95_ms = 1e3 * delay["mean_s"], 1e3 * delay["p95_s"]
+    axes.axvline(mean_ms, color="0.2", linewidth=0.9)
+    axes.axvline(p95_ms, color="0.2", linewidth=0.9, linestyle=":")
+    axes.set_title(f"{run.label}: mean {mean_ms:.1f} ms\n95 % within {p95_ms:.1f} ms", fontsize=8.0)
+    axes.margins(x=0.02)
+    axes.locator_params(axis="x", nbins=5)
+
+
+def _rebinned(counts: pd.DataFrame) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return heights (n,) and edges in ms (n + 1,) with bins joined to at most `MOST_BARS`."""
+    joined = -(-len(counts) // MOST_BARS)
+    starts = np.arange(0, len(counts), joined)
+    heights = np.add.reduceat(counts["count"].to_numpy(dtype=np.float64), starts)
+    edges = 1e3 * np.append(counts["bin_low_s"].to_numpy()[starts], counts["bin_high_s"].iloc[-1])
+    return heights, edges

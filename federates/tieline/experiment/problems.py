@@ -1,0 +1,209 @@
+"""Turns what pydantic found into sentences: where, what was given, what is allowed."""
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ValidationError
+
+Path = tuple[str | int, ...]
+Model = TypeVar("Model", bound=BaseModel)
+_Error = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong: the settings it concerns, the first of them to blame, and a text."""
+
+    paths: tuple[Path, ...]
+    text: str
+
+
+def dotted(path: Path) -> str:
+    """Return a path as it is written: `grid.events[0].at`."""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def near(given: object, allowed: Iterable[str]) -> str:
+    """Return `; did you mean 'x'?` with the nearest allowed word, or nothing if none is near."""
+    by_lower = {word.lower(): word for word in allowed}
+    found = difflib.get_close_matches(str(given).lower(), list(by_lower), n=1, cutoff=0.55)
+    return f"; did you mean '{by_lower[found[0]]}'?" if found else ""
+
+
+def checked(model: type[Model], data: object) -> tuple[Model | None, list[Problem]]:
+    """Return the model that the data describe, or None, and every problem found."""
+    try:
+        return model.model_validate(data), []
+    except ValidationError as error:
+        found: dict[Path, list[_Error]] = {}
+        for item in error.errors(include_url=False):
+            found.setdefault(_data_path(item, data), []).append(item)
+        return None, [
+            Problem((path,), _sentence(model, data, path, items))
+            for path, items in found.items()
+            if not _is_explained_deeper(path, data, found)
+        ]
+
+
+def _data_path(error: _Error, data: Any) -> Path:
+    """Return where in the data an error stands: pydantic's location without the names of unions."""
+    path: list[str | int] = []
+    parts = list(error["loc"])
+    is_of_key = error["type"] in ("missing", "extra_forbidden", "invalid_key")
+    for i, part in enumerate(parts):
+        is_last = i == len(parts) - 1
+        if is_last and is_of_key:
+            path.append(part)
+        elif isinstance(data, dict) and part in data:
+            # A union's branch may have the name of a key: then the key itself comes next.
+            is_branch = not is_last and (is_of_key or parts[i + 1] in data)
+            if isinstance(data[part], dict | list) or not is_branch:
+                data = data[part]
+                path.append(part)
+        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
+            data = data[part]
+            path.append(part)
+    return tuple(path)
+
+
+def _is_explained_deeper(path: Path, data: Any, found: Iterable[Path]) -> bool:
+    """Return whether a list failed only because of members that are reported themselves."""
+    is_list = isinstance(value_at(data, path), list)
+    return is_list and any(other[: len(path)] == path and other != path for other in found)
+
+
+def _sentence(model: type[BaseModel], data: Any, path: Path, errors: Sequence[_Error]) -> str:
+    first, kind = errors[0], errors[0]["type"]
+    where = dotted(path)
+    if kind in ("extra_forbidden", "invalid_key"):
+        return _unknown_key(model, path)
+    if kind == "missing":
+        about = _description(model, path)
+        return f"missing key '{where}'" + (f": {about}" if about else "")
+    given = value_at(data, path)
+    if kind == "union_tag_not_found":
+        return _unclear_event(model, path, given)
+    if kind == "value_error":
+        return f"{where} {first['ctx']['error']}"
+    unit = " s" if (_description(model, path) or "").endswith(", s") else ""
+    allowed = " or ".join(dict.fromkeys(_allowed(error, unit) for error in errors))
+    words = [word for error in errors for word in _words(error)]
+    hint = near(given, words) if isinstance(given, str) else ""
+    return f"{where or 'an experiment'} must be {allowed} (got {_shown(given)}{hint})"
+
+
+def _unknown_key(model: type[BaseModel], path: Path) -> str:
+    key, parent = str(path[-1]), path[:-1]
+    beside = list(_fields(model, parent))
+    elsewhere = [name for name in _all_keys(model) if name.split(".")[-1] == key]
+    hint = f"; did you mean '{elsewhere[0]}'?" if elsewhere else near(key, beside)
+    place = f" in {dotted(parent)}" if parent else ""
+    return f"unknown key '{key}'{place} ({(hint or '; allowed: ' + ', '.join(beside))[2:]})"
+
+
+def _unclear_event(model: type[BaseModel], path: Path, given: object) -> str:
+    kinds = [name for name in _fields(model, path) if name != "at"]
+    if not isinstance(given, dict):
+        return f"{dotted(path)} must be a group of keys: at, and {' or '.join(kinds)}"
+    hints = [near(key, kinds) for key in given if key != "at"]
+    hint = next((hint for hint in hints if hint), "")
+    keys = ", ".join(map(str, given))
+    return f"{dotted(path)} must have just one of {' and '.join(kinds)} (got {keys}{hint})"
+
+
+_BOUNDS = {
+    "greater_than": ("gt", "greater than {}"),
+    "greater_than_equal": ("ge", "{} or more"),
+    "less_than": ("lt", "less than {}"),
+    "less_than_equal": ("le", "{} or less"),
+}
+
+_KINDS = {
+    "int": "a whole number",
+    "float": "a number",
+    "string": "text",
+    "bool": "true or false",
+    "list": "a list",
+    "model": "a group of keys",
+    "dict": "a group of keys",
+    "finite": "a finite number",
+}
+
+
+def _allowed(error: _Error, unit: str) -> str:
+    kind, context = error["type"], error.get("ctx", {})
+    if kind in _BOUNDS:
+        key, text = _BOUNDS[kind]
+        return text.format(f"{context[key]:.15g}{unit}")
+    if kind == "literal_error":
+        words = _words(error)
+        return f"one of {', '.join(words)}" if len(words) > 1 else f"'{words[0]}'"
+    if kind in ("too_short", "string_too_short"):
+        return "not empty"
+    if kind == "too_long" or kind == "string_too_long":
+        return f"at most {context['max_length']} long"
+    if kind == "string_pattern_mismatch":
+        return "letters, digits, _ and -, beginning with a letter or digit"
+    return _KINDS.get(kind.split("_")[0], str(error["msg"]))
+
+
+def _words(error: _Error) -> list[str]:
+    if error["type"] != "literal_error":
+        return []
+    return [word.strip("'") for word in error["ctx"]["expected"].replace(" or ", ", ").split(", ")]
+
+
+def _shown(value: object) -> str:
+    if value is None:
+        return "nothing"
+    if isinstance(value, dict):
+        return f"keys {', '.join(map(str, value))}"
+    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def value_at(data: Any, path: Path) -> Any:
+    """Return the value at a path, or None where the data do not have it."""
+    for part in path:
+        try:
+            data = data[part]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return data
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in _models_in(part)]
+
+
+def _fields(model: type[BaseModel], path: Path) -> dict[str, Any]:
+    """Return the fields allowed at a path, of every model that may stand there."""
+    models = [model]
+    for part in path:
+        if isinstance(part, str):
+            fields = [kind.model_fields[part] for kind in models if part in kind.model_fields]
+            models = [found for field in fields for found in _models_in(field.annotation)]
+    return {name: field for kind in models for name, field in kind.model_fields.items()}
+
+
+def _description(model: type[BaseModel], path: Path) -> str | None:
+    if not path or not isinstance(path[-1], str):
+        return None
+    field = _fields(model, path[:-1]).get(path[-1])
+    return field.description if field else None
+
+
+def _all_keys(model: type[BaseModel], prefix: str = "") -> list[str]:
+    keys = []
+    for name, field in model.model_fields.items():
+        keys.append(prefix + name)
+        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            keys += _all_keys(field.annotation, f"{prefix}{name}.")
+    return keys

@@ -1,0 +1,226 @@
+"""One child process of a run: in a group of its own, heard, logged, ended and accounted for."""
+
+import collections
+import json
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tieline
+from tieline.cosim.process import LAUNCHER_VARIABLE
+
+_LOG_LIMIT_BYTES = 1_000_000
+_TAIL_LINES = 8
+_READ_BYTES = 65_536
+_LONGEST_LINE_BYTES = 1_000_000
+
+
+@dataclass(frozen=True)
+class ProcessUse:
+    """What one process cost: `cpu_s` user and system time, `peak_bytes` resident memory."""
+
+    name: str
+    exit_code: int
+    cpu_s: float
+    peak_bytes: int
+
+
+class Log:
+    """A text file that stops growing at 1 MB, and its last lines, which are kept in any case."""
+
+    def __init__(self, path: Path) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._file = path.open("wb")
+        self._left_bytes = _LOG_LIMIT_BYTES
+        self.tail: collections.deque[str] = collections.deque(maxlen=_TAIL_LINES)
+
+    def write(self, line: bytes) -> None:
+        """Add one line, given without its end."""
+        self.tail.append(line.decode(errors="replace"))
+        if self._left_bytes <= 0:
+            return
+        self._left_bytes -= len(line) + 1
+        self._file.write(line + b"\n")
+        if self._left_bytes <= 0:
+            self._file.write(f"(the log ends at {_LOG_LIMIT_BYTES} bytes)\n".encode())
+        self._file.flush()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+class Child:
+    """A process in its own session, whose standard output carries JSON lines.
+
+    Args:
+        name: what the run calls it.
+        command: the program and its arguments.
+        log: where its standard error, and whatever else it says, is kept.
+
+    Attributes:
+        exit_code: None while it runs; negative for the signal that killed it.
+    """
+
+    def __init__(self, name: str, command: Sequence[str], log: Path) -> None:
+        self.name = name
+        self.log = Log(log)
+        self.exit_code: int | None = None
+        self.use: ProcessUse | None = None
+        self._process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=_environment(),
+            start_new_session=True,
+        )
+        assert self._process.stdout is not None
+        assert self._process.stderr is not None
+        self._pending = {self._process.stdout.fileno(): b"", self._process.stderr.fileno(): b""}
+        self._stdout = self._process.stdout.fileno()
+        for descriptor in self._pending:
+            os.set_blocking(descriptor, False)
+
+    @property
+    def pid(self) -> int:
+        """The process identifier, which is its group's, too."""
+        return self._process.pid
+
+    @property
+    def descriptors(self) -> tuple[int, ...]:
+        """The pipes that are still open, to wait for."""
+        return tuple(self._pending)
+
+    def read(self) -> Iterator[dict[str, Any]]:
+        """Yield the JSON lines that have come; everything else goes to the log."""
+        for descriptor in tuple(self._pending):
+            for line in self._lines(descriptor):
+                message = _parsed(line) if descriptor == self._stdout else None
+                if message is None:
+                    self.log.write(line)
+                else:
+                    yield message
+
+    def poll(self) -> bool:
+        """Return whether the process has ended; what is left of its group ends with it."""
+        if self.exit_code is not None:
+            return True
+        # Looked at before it is reaped: until then its group's number cannot be another's.
+        if os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
+            return False
+        self._signal(signal.SIGKILL)
+        _, status, usage = os.wait4(self.pid, 0)
+        self.exit_code = os.waitstatus_to_exitcode(status)
+        self._process.returncode = self.exit_code
+        cpu_s = usage.ru_utime + usage.ru_stime
+        self.use = ProcessUse(self.name, self.exit_code, cpu_s, usage.ru_maxrss * 1024)
+        return True
+
+    def is_stopped(self) -> bool:
+        """Return whether a signal such as SIGSTOP holds the process."""
+        try:
+            stat = Path(f"/proc/{self.pid}/stat").read_text(encoding="ascii", errors="replace")
+        except OSError:
+            return False
+        return stat.rpartition(")")[2].split()[0] in ("T", "t")
+
+    def terminate(self) -> None:
+        """Ask the process to save and end; one that is stopped is woken for it."""
+        if not self.poll():
+            self._signal(signal.SIGTERM)
+            self._signal(signal.SIGCONT)
+
+    def kill(self) -> None:
+        """End the process and its group, and reap it."""
+        if not self.poll():
+            self._signal(signal.SIGKILL)
+            os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOWAIT)
+            self.poll()
+
+    def close(self) -> None:
+        """Close pipes and log; the process has ended."""
+        for message in self.read():
+            self.log.write(json.dumps(message).encode())
+        for stream in (self._process.stdout, self._process.stderr):
+            if stream is not None:
+                stream.close()
+        self._pending.clear()
+        self.log.close()
+
+    def _signal(self, number: signal.Signals) -> None:
+        try:
+            os.killpg(self.pid, number)
+        except ProcessLookupError:
+            # The group emptied itself meanwhile.
+            return
+
+    def _lines(self, descriptor: int) -> Iterator[bytes]:
+        while (data := _read(descriptor)) is not None:
+            if not data:
+                rest = self._pending.pop(descriptor)
+                if rest:
+                    yield rest
+                return
+            *lines, rest = (self._pending[descriptor] + data).split(b"\n")
+            if len(rest) > _LONGEST_LINE_BYTES:
+                lines, rest = [*lines, rest], b""
+            self._pending[descriptor] = rest
+            yield from lines
+
+
+def end_all(children: Sequence[Child], grace_s: float) -> None:
+    """End every child: each may save for `grace_s` after SIGTERM, then its group is killed."""
+    limit = time.monotonic() + grace_s
+    try:
+        for child in children:
+            child.terminate()
+        while time.monotonic() < limit and any(not child.poll() for child in children):
+            time.sleep(0.02)
+            drain(children)
+    finally:
+        for child in children:
+            child.kill()
+
+
+def drain(children: Sequence[Child]) -> None:
+    """Read what the children say, so that none waits for a full pipe; only logs keep it."""
+    for child in children:
+        for _ in child.read():
+            continue
+
+
+def _environment() -> dict[str, str]:
+    environment = dict(os.environ)
+    # The children run this very code, wherever it was imported from.
+    source = str(Path(tieline.__file__).resolve().parent.parent)
+    others = environment.get("PYTHONPATH")
+    environment["PYTHONPATH"] = source if not others else f"{source}{os.pathsep}{others}"
+    environment[LAUNCHER_VARIABLE] = str(os.getpid())
+    environment.setdefault("PYTHONFAULTHANDLER", "1")
+    # The matrices are small: threads of a linear algebra library cost here more than they give.
+    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        environment.setdefault(variable, "1")
+    return environment
+
+
+def _read(descriptor: int) -> bytes | None:
+    try:
+        return os.read(descriptor, _READ_BYTES)
+    except BlockingIOError:
+        return None
+
+
+def _parsed(line: bytes) -> dict[str, Any] | None:
+    if not line.startswith(b'{"federate"'):
+        return None
+    try:
+        message: dict[str, Any] = json.loads(line)
+    except ValueError:
+        return None
+    return message

@@ -1,0 +1,196 @@
+"""Tells from the federates' words and their processes' state who, if anyone, is at fault."""
+
+import signal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from tieline.cosim.interfaces import FEDERATES, FederationSettings
+from tieline.errors import CosimError
+from tieline.units import ns_to_seconds
+
+_LONGEST_PASS_S = 0.5
+_LEAST_CPU_S = 0.05
+_DONE = ("finished", "failed")
+_STATES = ("starting", "opening", "joining", "running", "finishing", *_DONE)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """One word of a federate: its state, the interval `k` and time of its last grant (-1: none)."""
+
+    federate: str
+    state: str
+    k: int
+    granted_ns: int
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """Who is at fault and why; not certain while the sign may be another's doing."""
+
+    name: str
+    reason: str
+    exit_code: int
+    is_certain: bool = True
+
+
+class Process(Protocol):
+    """What is looked at of a child process."""
+
+    exit_code: int | None
+
+    def is_stopped(self) -> bool:
+        """Return whether a signal holds it."""
+
+
+class Watch:
+    """What is known of the federates, and for how long none of them has come further.
+
+    Coming further is a new state or a new grant. Where a federate may rightly work for long
+    without either (opening its participant, its first interval, when code is compiled, and
+    writing its results) its processor time counts, too.
+
+    Attributes:
+        silence_s: wall time since any federate came further, s.
+    """
+
+    def __init__(self, settings: FederationSettings) -> None:
+        self.silence_s = 0.0
+        self._settings = settings
+        self._last: dict[str, dict[str, Any]] = {}
+        self._cpu_s: dict[str, float] = {}
+
+    def hear(self, message: Mapping[str, Any]) -> Progress | None:
+        """Take one word in; return it as progress, or None when it is not a federate's."""
+        name = str(message.get("federate"))
+        before = self._last.get(name, {})
+        self._last[name] = dict(message)
+        if _place(message) != _place(before) or self._works(name, message):
+            self.silence_s = 0.0
+        if name not in FEDERATES:
+            return None
+        return Progress(name, message["state"], message["k"], message["granted_ns"])
+
+    def pass_time(self, elapsed_s: float) -> None:
+        """Let wall time pass; a launcher that was itself held for long counts little of it."""
+        self.silence_s += min(elapsed_s, _LONGEST_PASS_S)
+
+    def granted_ns(self) -> dict[str, int]:
+        """Return the last time granted to each federate, -1 for none."""
+        return {name: self._last.get(name, {}).get("granted_ns", -1) for name in FEDERATES}
+
+    def is_running(self) -> bool:
+        """Return whether every federate has joined."""
+        return all(self._state(name) in ("running", "finishing", *_DONE) for name in FEDERATES)
+
+    def is_finished(self) -> bool:
+        """Return whether every federate has reached its end."""
+        return all(self._state(name) == "finished" for name in FEDERATES)
+
+    def suspect(self, processes: Mapping[str, Process]) -> Suspect | None:
+        """Return who is at fault so far, the surest sign first."""
+        return (
+            self._failed_by_itself()
+            or self._dead(processes)
+            or self._stopped(processes)
+            or self._ended_too_soon(processes)
+            or self._failed_by_others()
+            or self._silent()
+        )
+
+    def _state(self, name: str) -> str:
+        return str(self._last.get(name, {}).get("state", "starting"))
+
+    def _works(self, name: str, message: Mapping[str, Any]) -> bool:
+        may_be_long = message["state"] in ("opening", "finishing") or message.get("k") == 0
+        cpu_s = float(message.get("cpu_s", 0.0))
+        if not may_be_long or cpu_s - self._cpu_s.get(name, 0.0) < _LEAST_CPU_S:
+            return False
+        self._cpu_s[name] = cpu_s
+        return True
+
+    def _failed_by_itself(self) -> Suspect | None:
+        for name in FEDERATES:
+            if self._state(name) == "failed" and self._last[name]["fault"] == "own":
+                return self._by_own_word(name, is_certain=True)
+        return None
+
+    def _dead(self, processes: Mapping[str, Process]) -> Suspect | None:
+        for name, process in processes.items():
+            if process.exit_code and not self._has_failed(name):
+                reason = f"died: {_manner(process.exit_code)}{self._when(name)}"
+                return Suspect(name, reason, CosimError.exit_code)
+        return None
+
+    def _stopped(self, processes: Mapping[str, Process]) -> Suspect | None:
+        limit_s, _ = self._limit()
+        is_due = self.silence_s > limit_s or any(self._has_failed(name) for name in FEDERATES)
+        for name, process in processes.items():
+            if is_due and process.is_stopped():
+                reason = f"hung: its process is stopped by a signal{self._when(name)}"
+                return Suspect(name, reason, CosimError.exit_code)
+        return None
+
+    def _ended_too_soon(self, processes: Mapping[str, Process]) -> Suspect | None:
+        for name, process in processes.items():
+            # A broker ends as soon as the federates have left, while they write their results.
+            good = _DONE if name in FEDERATES else ("finishing", *_DONE)
+            states = [self._state(member) for member in _members(name)]
+            if process.exit_code is not None and any(state not in good for state in states):
+                reason = f"ended before the run did{self._when(name)}"
+                return Suspect(name, reason, CosimError.exit_code, is_certain=name in FEDERATES)
+        return None
+
+    def _failed_by_others(self) -> Suspect | None:
+        for name in FEDERATES:
+            if self._state(name) == "failed":
+                return self._by_own_word(name, is_certain=False)
+        return None
+
+    def _by_own_word(self, name: str, is_certain: bool) -> Suspect:
+        word = self._last[name]
+        reason = f"{word['reason']}{self._when(name)}"
+        return Suspect(name, reason, int(word["exit_code"]), is_certain)
+
+    def _silent(self) -> Suspect | None:
+        limit_s, what = self._limit()
+        if self.silence_s <= limit_s or self.is_finished():
+            return None
+        name = min(FEDERATES, key=self._blame)
+        reason = f"hung: {what} for {limit_s:g} s of wall time{self._when(name)}"
+        return Suspect(name, reason, CosimError.exit_code)
+
+    def _limit(self) -> tuple[float, str]:
+        if self.is_running():
+            return self._settings.hang_timeout, "no federate was granted anything"
+        return self._settings.start_timeout, "it has not joined the federation"
+
+    def _has_failed(self, name: str) -> bool:
+        return any(self._state(member) == "failed" for member in _members(name))
+
+    def _blame(self, name: str) -> tuple[int, bool, int]:
+        """Return a key, least for the one to name: the furthest behind, then whose turn it is."""
+        word = self._last.get(name, {})
+        turn = (bool(word.get("waits")), -int(word.get("granted_ns", -1)))
+        return _STATES.index(self._state(name)), *turn
+
+    def _when(self, name: str) -> str:
+        granted_ns = self._last.get(name, {}).get("granted_ns", -1)
+        if granted_ns < 0:
+            return f" (while {self._state(name)})" if name in FEDERATES else ""
+        return f" (last granted {ns_to_seconds(granted_ns):.6f} s)"
+
+
+def _place(message: Mapping[str, Any]) -> tuple[Any, Any]:
+    return message.get("state"), message.get("k")
+
+
+def _members(name: str) -> Sequence[str]:
+    return (name,) if name in FEDERATES else FEDERATES
+
+
+def _manner(exit_code: int) -> str:
+    if exit_code < 0:
+        return f"killed by {signal.Signals(-exit_code).name}"
+    return f"exit code {exit_code}"

@@ -1,0 +1,133 @@
+"""What every network engine does: takes frames at instants, gives deliveries and drops in order."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tieline.errors import CosimError
+
+ARRIVAL = np.dtype(
+    [("arrival_ns", "<i8"), ("source", "<u2"), ("destination", "<u2"), ("sequence", "<u4")]
+)
+"""A packet that its controller can use from `arrival_ns` on."""
+
+DROP = np.dtype(
+    [
+        ("dropped_ns", "<i8"),
+        ("source", "<u2"),
+        ("destination", "<u2"),
+        ("sequence", "<u4"),
+        ("reason", "u1"),
+    ]
+)
+"""A packet that ended at `dropped_ns`; `reason` is `QUEUE_FULL` or `LOSS`."""
+
+DELIVERED, QUEUE_FULL, LOSS = 0, 1, 2
+"""How a packet ends: at its controller, at a full queue, or corrupted on a link."""
+
+NO_ARRIVALS = np.empty(0, ARRIVAL)
+NO_DROPS = np.empty(0, DROP)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of PMU packets up to an instant.
+
+    Attributes:
+        arrivals: (m,) of `ARRIVAL`, in the order (arrival_ns, source, sequence, destination).
+        drops: (d,) of `DROP`, in order of time.
+    """
+
+    arrivals: NDArray[np.void]
+    drops: NDArray[np.void]
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Packets of all flows since the start; `in_flight` is counted on its own, not inferred."""
+
+    sent: int
+    delivered: int
+    dropped_queue: int
+    dropped_loss: int
+    in_flight: int
+
+    def check(self, at_ns: int) -> None:
+        """Raise CosimError unless every packet sent is accounted for."""
+        ended = self.delivered + self.dropped_queue + self.dropped_loss
+        if self.sent != ended + self.in_flight:
+            raise CosimError(
+                f"the network lost count of packets at {at_ns} ns: {self.sent} sent, but "
+                f"{self.delivered} delivered, {self.dropped_queue} dropped at queues, "
+                f"{self.dropped_loss} lost on links and {self.in_flight} in flight"
+            )
+
+
+@dataclass(frozen=True)
+class LinkUse:
+    """What one direction of one link carried, PMU and cross traffic together.
+
+    Attributes:
+        origin, target: the nodes.
+        rate_bps: its rate.
+        packets, bytes: put on the link, those lost on it included, link-layer bytes included.
+        dropped_queue: packets that found the queue full.
+        dropped_loss: packets that used the link and were lost at its end.
+        busy_ns: time in transmission.
+        max_queue: the most packets that waited, besides the one in transmission.
+    """
+
+    origin: str
+    target: str
+    rate_bps: int
+    packets: int
+    bytes: int
+    dropped_queue: int
+    dropped_loss: int
+    busy_ns: int
+    max_queue: int
+
+
+class Engine(Protocol):
+    """A network that carries one packet of every frame to every destination.
+
+    Time only goes forward: frames are sent at or after the last `run_until`. However often
+    `run_until` is called on the way, the outcome is the same to the nanosecond.
+    """
+
+    def send(self, measured_ns: int, sources: NDArray[np.int64], sequence: int) -> None:
+        """Take the frames that some sources measured at one instant.
+
+        Args:
+            measured_ns: the instant of measurement.
+            sources: their numbers, ascending.
+            sequence: the number of the frame; each source sends each number once.
+        """
+
+    def run_until(self, until_ns: int) -> Outcome:
+        """Return what ended after the last call and up to and including `until_ns`.
+
+        Raises:
+            CosimError: packets are not all accounted for.
+        """
+
+    def counts(self) -> Counts:
+        """Return the counts at the instant of the last `run_until`."""
+
+    def links(self) -> list[LinkUse]:
+        """Return what each link carried, direction by direction; none without a topology."""
+
+
+def in_order(arrivals: NDArray[np.void]) -> NDArray[np.void]:
+    """Return arrivals in the total order (arrival_ns, source, sequence, destination)."""
+    times_ns = arrivals["arrival_ns"]
+    order = np.argsort(times_ns)
+    if not np.any(times_ns[order[1:]] == times_ns[order[:-1]]):
+        return arrivals[order]
+    # 16 + 32 + 16 bits hold the three lesser keys as one unsigned number.
+    tie = arrivals["source"].astype(np.uint64) << np.uint64(48)
+    tie |= arrivals["sequence"].astype(np.uint64) << np.uint64(16)
+    tie |= arrivals["destination"]
+    return arrivals[np.lexsort((tie, times_ns))]

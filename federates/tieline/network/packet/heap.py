@@ -1,0 +1,72 @@
+"""A binary heap of events in flat memory, for compiled code.
+
+An event is a row (time_ns, order, item) of the table that begins at `heap`. The smallest (time_ns,
+order) stands first, so that events of one instant come out by their order numbers, which the caller
+gives without repeats.
+"""
+
+from tieline.compiled import compiled
+from tieline.network.packet.memory import HEAP_COLUMNS, ITEM, ORDER, TIME, Cells
+
+
+@compiled
+def push(cells: Cells, heap: int, size: int, time_ns: int, order: int, item: int) -> None:
+    """Add an event to a heap of `size` events; the table must have a row more than that."""
+    place = size
+    while place > 0:
+        parent = (place - 1) >> 1
+        if not _precedes(cells, time_ns, order, heap + HEAP_COLUMNS * parent):
+            break
+        _move(cells, heap + HEAP_COLUMNS * parent, heap + HEAP_COLUMNS * place)
+        place = parent
+    _write(cells, heap + HEAP_COLUMNS * place, time_ns, order, item)
+
+
+@compiled
+def replace_first(cells: Cells, heap: int, size: int, time_ns: int, order: int, item: int) -> None:
+    """Put an event in the place of the first and restore the order: a pop and a push in one."""
+    place = 0
+    child = 1
+    while child < size:
+        row = heap + HEAP_COLUMNS * child
+        if child + 1 < size and _precedes(
+            cells, cells[row + HEAP_COLUMNS], cells[row + HEAP_COLUMNS + ORDER], row
+        ):
+            child += 1
+            row += HEAP_COLUMNS
+        if _precedes(cells, time_ns, order, row):
+            break
+        _move(cells, row, heap + HEAP_COLUMNS * place)
+        place = child
+        child = 2 * place + 1
+    _write(cells, heap + HEAP_COLUMNS * place, time_ns, order, item)
+
+
+@compiled
+def pop(cells: Cells, heap: int, size: int) -> None:
+    """Remove the first of `size` events, leaving `size` - 1."""
+    last = heap + HEAP_COLUMNS * (size - 1)
+    if size > 1:
+        replace_first(
+            cells, heap, size - 1, cells[last + TIME], cells[last + ORDER], cells[last + ITEM]
+        )
+
+
+@compiled
+def _precedes(cells: Cells, time_ns: int, order: int, row: int) -> bool:
+    other_ns = cells[row + TIME]
+    return time_ns < other_ns or (time_ns == other_ns and order < cells[row + ORDER])
+
+
+@compiled
+def _move(cells: Cells, origin: int, row: int) -> None:
+    cells[row + TIME] = cells[origin + TIME]
+    cells[row + ORDER] = cells[origin + ORDER]
+    cells[row + ITEM] = cells[origin + ITEM]
+
+
+@compiled
+def _write(cells: Cells, row: int, time_ns: int, order: int, item: int) -> None:
+    cells[row + TIME] = time_ns
+    cells[row + ORDER] = order
+    cells[row + ITEM] = item

@@ -1,0 +1,177 @@
+"""Writes what the network did: flows, links, delays and, on request, every packet."""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tieline.network.engine import DELIVERED, LinkUse, Outcome
+from tieline.network.spec import NetworkSpec
+from tieline.network.stats import DELAY_BIN_NS, DELAY_BINS, FlowStatistics
+from tieline.tables import Column, TableStream, write_table
+from tieline.units import NS_PER_S
+
+_PERCENTILE = "within 0.8 % of its excess over the flow's least possible delay"
+
+FLOW_COLUMNS = (
+    Column("flow", "", "number of the flow: source by source, destination by destination", "int64"),
+    Column("source", "", "PMU", "str"),
+    Column("destination", "", "controller", "str"),
+    Column("source_bus", "", "bus of the PMU", "int64"),
+    Column("unit", "", "unit of the controller", "str"),
+    Column("hops", "", "links on the route", "int64"),
+    Column("sent", "", "packets whose frame was measured", "int64"),
+    Column("delivered", "", "packets that the controller could use by the end", "int64"),
+    Column("dropped_queue", "", "packets dropped at a full queue", "int64"),
+    Column("dropped_loss", "", "packets lost on a link", "int64"),
+    Column("in_flight", "", "packets under way at the end", "int64"),
+    Column("delay_mean_s", "s", "mean combined delay, measurement to use by the controller"),
+    Column("delay_min_s", "s", "least combined delay"),
+    Column("delay_p50_s", "s", f"median combined delay, {_PERCENTILE}"),
+    Column("delay_p95_s", "s", f"95th percentile of the combined delay, {_PERCENTILE}"),
+    Column("delay_max_s", "s", "longest combined delay"),
+    Column("jitter_s", "s", "mean absolute difference of the delays of consecutive arrivals"),
+    Column("loss", "", "dropped packets as a share of those delivered or dropped"),
+)
+
+LINK_COLUMNS = (
+    Column("from", "", "node that sends", "str"),
+    Column("to", "", "node that receives", "str"),
+    Column("rate_bps", "bit/s", "rate of this direction", "int64"),
+    Column("packets", "", "packets put on the link, lost ones and cross traffic included", "int64"),
+    Column("bytes", "", "bytes put on the link, link-layer bytes included", "int64"),
+    Column("dropped_queue", "", "packets that found the queue full", "int64"),
+    Column("dropped_loss", "", "packets lost on the link", "int64"),
+    Column("utilisation", "", "share of the time in transmission"),
+    Column("max_queue", "", "most packets waiting besides the one in transmission", "int64"),
+)
+
+DELAY_COLUMNS = (
+    Column("bin_low_s", "s", "lower edge of the bin, included"),
+    Column("bin_high_s", "s", "upper edge of the bin, excluded; the longest delay in the last bin"),
+    Column("count", "", "delivered PMU packets, all flows, by combined delay", "int64"),
+)
+
+PACKET_COLUMNS = (
+    Column("flow", "", "number of the flow", "int64"),
+    Column("sequence", "", "number of the frame", "int64"),
+    Column("measured_ns", "ns", "instant of measurement", "int64"),
+    Column("ended_ns", "ns", "when the controller could use it, or when it was dropped", "int64"),
+    Column("outcome", "", "0 delivered, 1 dropped at a full queue, 2 lost on a link", "uint8"),
+)
+
+
+def write_flows(path: Path, spec: NetworkSpec, statistics: FlowStatistics) -> None:
+    """Write flows.parquet: one row a PMU flow."""
+    sources = [spec.sources[flow.source] for flow in spec.flows]
+    destinations = [spec.destinations[flow.destination] for flow in spec.flows]
+    dropped = statistics.dropped_queue + statistics.dropped_loss
+    ended = statistics.delivered + dropped
+    write_table(
+        path,
+        FLOW_COLUMNS,
+        {
+            "flow": np.arange(len(spec.flows)),
+            "source": [source.name for source in sources],
+            "destination": [destination.name for destination in destinations],
+            "source_bus": np.array([source.bus for source in sources], dtype=np.int64),
+            "unit": [destination.unit for destination in destinations],
+            "hops": np.array([len(flow.route) - 1 for flow in spec.flows], dtype=np.int64),
+            "sent": statistics.sent,
+            "delivered": statistics.delivered,
+            "dropped_queue": statistics.dropped_queue,
+            "dropped_loss": statistics.dropped_loss,
+            "in_flight": statistics.in_flight,
+            "delay_mean_s": statistics.mean_ns() / NS_PER_S,
+            "delay_min_s": statistics.min_ns() / NS_PER_S,
+            "delay_p50_s": statistics.percentiles_ns(0.5) / NS_PER_S,
+            "delay_p95_s": statistics.percentiles_ns(0.95) / NS_PER_S,
+            "delay_max_s": statistics.max_ns() / NS_PER_S,
+            "jitter_s": statistics.jitter_ns() / NS_PER_S,
+            "loss": np.where(ended > 0, dropped / np.maximum(ended, 1), np.nan),
+        },
+    )
+
+
+def write_links(path: Path, links: Sequence[LinkUse], duration_ns: int) -> None:
+    """Write links.parquet: one row a direction of a link."""
+    whole_ns = max(duration_ns, 1)
+    write_table(
+        path,
+        LINK_COLUMNS,
+        {
+            "from": [link.origin for link in links],
+            "to": [link.target for link in links],
+            "rate_bps": _counts(link.rate_bps for link in links),
+            "packets": _counts(link.packets for link in links),
+            "bytes": _counts(link.bytes for link in links),
+            "dropped_queue": _counts(link.dropped_queue for link in links),
+            "dropped_loss": _counts(link.dropped_loss for link in links),
+            "utilisation": _counts(link.busy_ns for link in links) / whole_ns,
+            "max_queue": _counts(link.max_queue for link in links),
+        },
+    )
+
+
+def write_delays(path: Path, statistics: FlowStatistics) -> None:
+    """Write delays.parquet: the histogram from its first to its last occupied bin."""
+    occupied = np.flatnonzero(statistics.delay_counts)
+    first, last = (occupied[0], occupied[-1]) if len(occupied) else (0, -1)
+    bins = np.arange(first, last + 1)
+    high_ns = (bins + 1) * float(DELAY_BIN_NS)
+    if last == DELAY_BINS:
+        high_ns[-1] = np.nanmax(statistics.max_ns())
+    write_table(
+        path,
+        DELAY_COLUMNS,
+        {
+            "bin_low_s": bins * (DELAY_BIN_NS / NS_PER_S),
+            "bin_high_s": high_ns / NS_PER_S,
+            "count": statistics.delay_counts[first : last + 1],
+        },
+    )
+
+
+class PacketLog:
+    """packets.parquet, written as packets end; those in flight at the end have no row."""
+
+    def __init__(self, path: Path, flow_of: NDArray[np.int64]) -> None:
+        self._stream = TableStream(path, PACKET_COLUMNS)
+        self._flow_of = flow_of
+
+    def add(
+        self,
+        outcome: Outcome,
+        arrivals_measured_ns: NDArray[np.int64],
+        drops_measured_ns: NDArray[np.int64],
+    ) -> None:
+        """Add the packets of an outcome, with the instants at which they were measured."""
+        arrivals, drops = outcome.arrivals, outcome.drops
+        self._rows(arrivals, "arrival_ns", arrivals_measured_ns, np.uint8(DELIVERED))
+        self._rows(drops, "dropped_ns", drops_measured_ns, drops["reason"])
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._stream.close()
+
+    def _rows(
+        self,
+        records: NDArray[np.void],
+        time: str,
+        measured_ns: NDArray[np.int64],
+        outcome: NDArray[np.uint8] | np.uint8,
+    ) -> None:
+        self._stream.append(
+            {
+                "flow": self._flow_of[records["source"], records["destination"]],
+                "sequence": records["sequence"].astype(np.int64),
+                "measured_ns": measured_ns,
+                "ended_ns": records[time],
+                "outcome": np.broadcast_to(outcome, len(records)),
+            }
+        )
+
+
+def _counts(values: Iterable[int]) -> NDArray[np.int64]:
+    return np.fromiter(values, dtype=np.int64)

@@ -1,0 +1,136 @@
+"""Counts and delays of every PMU flow, gathered as the run goes in memory that does not grow."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tieline.compiled import compiled
+from tieline.network.engine import LOSS, QUEUE_FULL, Outcome
+from tieline.network.histogram import BINS, bin_of, percentile_ns
+
+DELAY_BIN_NS = 100_000
+"""Width of the bins of the histogram over all flows."""
+
+DELAY_BINS = 200_000
+"""They reach to 20 s; one more takes what is longer."""
+
+# Columns of a flow's delays.
+_COUNT, _SUM, _LEAST, _MOST, _LAST, _STEPS = range(6)
+
+
+class FlowStatistics:
+    """What became of the packets of each flow, and how long they took.
+
+    The delay of a packet is its combined delay, from the measurement to the instant at which the
+    controller can use it. A flow's jitter is the mean absolute difference of the delays of packets
+    that arrived one after the other (the IP packet delay variation of RFC 3393, taken over
+    consecutive arrivals).
+
+    Attributes:
+        sent, delivered, dropped_queue, dropped_loss: (flows,) packets so far.
+        delay_counts: (DELAY_BINS + 1,) delivered packets of all flows by delay.
+
+    Args:
+        least_ns: (flows,) the least delay that each flow can have.
+        flow_of: (sources, destinations) flow number of each pair.
+    """
+
+    def __init__(self, least_ns: NDArray[np.int64], flow_of: NDArray[np.int64]) -> None:
+        flows = len(least_ns)
+        self._least_ns = least_ns
+        self._flow_of = flow_of
+        self.sent = np.zeros(flows, dtype=np.int64)
+        self.dropped_queue = np.zeros(flows, dtype=np.int64)
+        self.dropped_loss = np.zeros(flows, dtype=np.int64)
+        self.delay_counts = np.zeros(DELAY_BINS + 1, dtype=np.int64)
+        self._delays = np.zeros((flows, 6), dtype=np.int64)
+        self._bins = np.zeros((flows, BINS), dtype=np.uint32)
+        self.add(Outcome(_NONE, _NONE), _NO_TIMES)
+
+    @property
+    def delivered(self) -> NDArray[np.int64]:
+        """Packets that their controller can use."""
+        return self._delays[:, _COUNT]
+
+    @property
+    def in_flight(self) -> NDArray[np.int64]:
+        """Packets sent that have neither been delivered nor dropped."""
+        return self.sent - self.delivered - self.dropped_queue - self.dropped_loss
+
+    def add_sent(self, sources: NDArray[np.int64]) -> None:
+        """Count one packet from each of these sources to every destination."""
+        self.sent[self._flow_of[sources].ravel()] += 1
+
+    def add(self, outcome: Outcome, measured_ns: NDArray[np.int64]) -> None:
+        """Take what ended.
+
+        Args:
+            outcome: arrivals in order, and drops.
+            measured_ns: (arrivals,) when each frame that arrived was measured.
+        """
+        arrivals, drops = outcome.arrivals, outcome.drops
+        flows = self._flow_of[arrivals["source"], arrivals["destination"]]
+        delays_ns = arrivals["arrival_ns"] - measured_ns
+        _add_delays(flows, delays_ns, self._least_ns, self._delays, self._bins, self.delay_counts)
+        if len(drops):
+            dropped = self._flow_of[drops["source"], drops["destination"]]
+            np.add.at(self.dropped_queue, dropped[drops["reason"] == QUEUE_FULL], 1)
+            np.add.at(self.dropped_loss, dropped[drops["reason"] == LOSS], 1)
+
+    def mean_ns(self) -> NDArray[np.float64]:
+        """Return each flow's mean delay; NaN where nothing arrived, here and below."""
+        return self._where_delivered(self._delays[:, _SUM] / np.maximum(self.delivered, 1))
+
+    def min_ns(self) -> NDArray[np.float64]:
+        """Return each flow's least delay."""
+        return self._where_delivered(self._delays[:, _LEAST])
+
+    def max_ns(self) -> NDArray[np.float64]:
+        """Return each flow's longest delay."""
+        return self._where_delivered(self._delays[:, _MOST])
+
+    def jitter_ns(self) -> NDArray[np.float64]:
+        """Return each flow's jitter; NaN where less than two packets arrived."""
+        pairs = self.delivered - 1
+        return np.where(pairs > 0, self._delays[:, _STEPS] / np.maximum(pairs, 1), np.nan)
+
+    def percentiles_ns(self, share: float) -> NDArray[np.float64]:
+        """Return the delay that `share` of each flow's packets do not exceed."""
+        values = np.full(len(self._least_ns), np.nan)
+        for flow in np.flatnonzero(self.delivered):
+            delay_ns = self._least_ns[flow] + percentile_ns(self._bins[flow], share)
+            values[flow] = np.clip(delay_ns, self._delays[flow, _LEAST], self._delays[flow, _MOST])
+        return values
+
+    def _where_delivered(self, values: NDArray[np.generic]) -> NDArray[np.float64]:
+        return np.where(self.delivered > 0, values, np.nan)
+
+
+_NONE = np.empty(
+    0, [("arrival_ns", "<i8"), ("source", "<u2"), ("destination", "<u2"), ("reason", "u1")]
+)
+_NO_TIMES = np.empty(0, np.int64)
+
+
+@compiled
+def _add_delays(
+    flows: NDArray[np.int64],
+    delays_ns: NDArray[np.int64],
+    least_ns: NDArray[np.int64],
+    delays: NDArray[np.int64],
+    bins: NDArray[np.uint32],
+    counts: NDArray[np.int64],
+) -> None:
+    for place in range(len(flows)):
+        flow = flows[place]
+        delay_ns = delays_ns[place]
+        bins[flow, bin_of(delay_ns - least_ns[flow])] += 1
+        counts[min(delay_ns // DELAY_BIN_NS, DELAY_BINS)] += 1
+        if delays[flow, _COUNT] == 0:
+            delays[flow, _LEAST] = delay_ns
+        else:
+            delays[flow, _STEPS] += abs(delay_ns - delays[flow, _LAST])
+        delays[flow, _COUNT] += 1
+        delays[flow, _SUM] += delay_ns
+        delays[flow, _LEAST] = min(delays[flow, _LEAST], delay_ns)
+        delays[flow, _MOST] = max(delays[flow, _MOST], delay_ns)
+        delays[flow, _LAST] = delay_ns

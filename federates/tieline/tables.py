@@ -1,0 +1,242 @@
+"""Result tables: Parquet files with unit and description on every column, streamed during a run.
+
+A run that is killed leaves an Arrow IPC stream beside its target, readable up to the last whole
+batch; `salvage` turns it into Parquet. Parquet itself keeps its index at the end of the file, so an
+unfinished Parquet file could not be read at all.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import ArrayLike, NDArray
+
+_STREAM_SUFFIX = ".arrows"
+_VALUES_PER_BATCH = 131_072
+_MOST_ROWS_PER_BATCH = 32_768
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: its unit (`pu`, `Hz`, ...; empty for counts and names) and what it says.
+
+    `dtype` is a NumPy type name, or `str` for text. NaN in a column of floats is stored as null.
+    """
+
+    name: str
+    unit: str
+    description: str
+    dtype: str = "float64"
+
+
+class TableStream:
+    """A table that grows by rows: an Arrow IPC stream first, Parquet at `path` once closed.
+
+    Rows are gathered to batches of about a megabyte, and each batch reaches the operating system
+    before `append` returns: one batch is the memory held, and the most that a killed process loses.
+
+    Args:
+        path: the Parquet file to make; the stream stands beside it with the suffix `.arrows`.
+        columns: the table's columns, in order.
+        metadata: facts about the whole table, kept in the file's schema.
+
+    Raises:
+        ValueError: there is no column, or two have one name.
+    """
+
+    def __init__(
+        self, path: Path, columns: Sequence[Column], metadata: Mapping[str, str] | None = None
+    ) -> None:
+        self.path = path
+        self._stream_path = path.with_suffix(_STREAM_SUFFIX)
+        self._schema = _schema_of(columns, metadata)
+        self._capacity = max(1, min(_MOST_ROWS_PER_BATCH, _VALUES_PER_BATCH // len(columns)))
+        self._buffers = {
+            column.name: np.empty(self._capacity, _numpy_type(column.dtype)) for column in columns
+        }
+        self._filled = 0
+        self._is_open = True
+        self._sink = pa.OSFile(str(self._stream_path), "wb")
+        self._writer = pa.ipc.new_stream(self._sink, self._schema)
+        # Arrow writes the schema with the first batch: an empty one makes the file readable now.
+        self._write_batch()
+
+    def append(self, rows: Mapping[str, NDArray[np.generic]]) -> None:
+        """Add rows; the arrays are copied.
+
+        A call costs about a microsecond a column however few the rows: hand over many at a time.
+
+        Args:
+            rows: one array (m,) for each column, by its name.
+
+        Raises:
+            ValueError: a column is missing or unknown, the lengths differ, or the table is closed.
+            TypeError: an array's type cannot be stored in its column without losing its kind.
+        """
+        if not self._is_open:
+            raise ValueError(f"{self.path.name} is closed: no rows can be added")
+        count = _common_length(self.path, self._buffers, rows)
+        start = 0
+        while start < count:
+            taken = min(count - start, self._capacity - self._filled)
+            for name, buffer in self._buffers.items():
+                target = buffer[self._filled : self._filled + taken]
+                np.copyto(target, rows[name][start : start + taken], casting="same_kind")
+            self._filled += taken
+            start += taken
+            if self._filled == self._capacity:
+                self._write_batch()
+
+    def flush(self) -> None:
+        """Hand every row so far to the operating system."""
+        if self._filled:
+            self._write_batch()
+
+    def close(self) -> None:
+        """Write what is left, make the Parquet file and remove the stream; again does nothing."""
+        if not self._is_open:
+            return
+        self.flush()
+        self._is_open = False
+        self._writer.close()
+        self._sink.close()
+        _to_parquet(self._stream_path, self.path)
+
+    def _write_batch(self) -> None:
+        arrays = {name: buffer[: self._filled] for name, buffer in self._buffers.items()}
+        self._writer.write_batch(_batch(self._schema, arrays))
+        self._filled = 0
+
+
+def salvage(folder: Path) -> list[Path]:
+    """Turn every stream left in `folder` by a killed process into Parquet, and return those files.
+
+    The whole batches before a truncated end are kept. A stream cut before its schema was complete
+    holds nothing and is removed.
+    """
+    made = []
+    for stream_path in sorted(folder.glob(f"*{_STREAM_SUFFIX}")):
+        path = stream_path.with_suffix(".parquet")
+        if _to_parquet(stream_path, path):
+            made.append(path)
+    return made
+
+
+def write_table(path: Path, columns: Sequence[Column], data: Mapping[str, ArrayLike]) -> None:
+    """Write a small table at once; `path` appears whole or not at all.
+
+    Raises:
+        ValueError: a column is missing or unknown, or the lengths differ.
+        TypeError: values cannot be stored in their column without losing their kind.
+    """
+    schema = _schema_of(columns, None)
+    arrays = {
+        column.name: np.asarray(data[column.name]).astype(
+            _numpy_type(column.dtype), casting="same_kind"
+        )
+        for column in columns
+        if column.name in data
+    }
+    extra = {name: np.asarray(values) for name, values in data.items() if name not in arrays}
+    _common_length(path, dict.fromkeys(schema.names), {**arrays, **extra})
+    part = _part_of(path)
+    pq.write_table(pa.Table.from_batches([_batch(schema, arrays)]), part, compression="zstd")
+    part.replace(path)
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """Return a table; nulls in a column of floats become NaN."""
+    return pd.read_parquet(path)
+
+
+def units_of(path: Path) -> dict[str, tuple[str, str]]:
+    """Return (unit, description) of each column of a table, by its name."""
+    return {
+        field.name: (field.metadata[b"unit"].decode(), field.metadata[b"description"].decode())
+        for field in pq.read_schema(path)
+    }
+
+
+def metadata_of(path: Path) -> dict[str, str]:
+    """Return the facts that a table's schema carries about the whole table."""
+    metadata = pq.read_schema(path).metadata or {}
+    return {key.decode(): value.decode() for key, value in metadata.items()}
+
+
+def _schema_of(columns: Sequence[Column], metadata: Mapping[str, str] | None) -> pa.Schema:
+    names = [column.name for column in columns]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if not names or twice:
+        raise ValueError(f"a table needs columns of distinct names (repeated: {twice})")
+    fields = [
+        pa.field(
+            column.name,
+            _arrow_type(column.dtype),
+            metadata={"unit": column.unit, "description": column.description},
+        )
+        for column in columns
+    ]
+    return pa.schema(fields, metadata=dict(metadata) if metadata else None)
+
+
+def _numpy_type(dtype: str) -> "np.dtype[np.generic]":
+    return np.dtype(object) if dtype == "str" else np.dtype(dtype)
+
+
+def _arrow_type(dtype: str) -> pa.DataType:
+    return pa.string() if dtype == "str" else pa.from_numpy_dtype(np.dtype(dtype))
+
+
+def _batch(schema: pa.Schema, arrays: Mapping[str, NDArray[np.generic]]) -> pa.RecordBatch:
+    columns = [pa.array(arrays[field.name], field.type, from_pandas=True) for field in schema]
+    return pa.RecordBatch.from_arrays(columns, schema=schema)
+
+
+def _common_length(
+    path: Path, expected: Mapping[str, object], rows: Mapping[str, NDArray[np.generic]]
+) -> int:
+    if expected.keys() != rows.keys():
+        missing, unknown = (
+            sorted(expected.keys() - rows.keys()),
+            sorted(rows.keys() - expected.keys()),
+        )
+        raise ValueError(f"rows for {path.name}: missing columns {missing}, unknown {unknown}")
+    shapes = {name: values.shape for name, values in rows.items()}
+    first = next(iter(shapes.values()))
+    if len(first) != 1 or any(shape != first for shape in shapes.values()):
+        raise ValueError(f"rows for {path.name}: arrays of one length expected, got {shapes}")
+    return int(first[0])
+
+
+def _part_of(path: Path) -> Path:
+    return path.with_name(f".{path.name}.part")
+
+
+def _to_parquet(stream_path: Path, path: Path) -> bool:
+    with pa.OSFile(str(stream_path), "rb") as source:
+        try:
+            reader = pa.ipc.open_stream(source)
+        except (pa.ArrowInvalid, OSError):
+            reader = None
+        if reader is not None:
+            with pq.ParquetWriter(_part_of(path), reader.schema, compression="zstd") as writer:
+                for batch in _whole_batches(reader):
+                    writer.write_batch(batch)
+    if reader is not None:
+        _part_of(path).replace(path)
+    stream_path.unlink()
+    return reader is not None
+
+
+def _whole_batches(reader: pa.RecordBatchReader) -> Iterator[pa.RecordBatch]:
+    while True:
+        try:
+            batch = reader.read_next_batch()
+        except (StopIteration, pa.ArrowInvalid, OSError):
+            return
+        if batch.num_rows:
+            yield batch

@@ -1,0 +1,70 @@
+"""Loads against the definition of what they draw."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tieline.grid.loads import LoadCurrents, correction, settle
+
+
+def one_load(p_power: float, p_current: float, q_power: float, q_current: float) -> LoadCurrents:
+    """A load of 2 + j0.5 pu at an initial voltage of 0.98 pu."""
+    v0 = 0.98
+    array = lambda value: np.array([value])  # noqa: E731
+    return LoadCurrents(
+        bus=np.array([0]),
+        p0=array(2.0),
+        q0=array(0.5),
+        v0=array(v0),
+        p_power=array(p_power),
+        p_current=array(p_current),
+        q_power=array(q_power),
+        q_current=array(q_current),
+        admittance=array((2.0 - 0.5j) / v0**2),
+    )
+
+
+shares = st.floats(0.0, 0.5)
+
+
+@settings(deadline=None)
+@given(shares, shares, shares, shares, st.floats(0.5, 1.3), st.floats(-3.1, 3.1))
+def test_a_load_draws_its_constant_power_current_and_impedance_parts(
+    p_power: float, p_current: float, q_power: float, q_current: float, size: float, angle: float
+) -> None:
+    """A part that followed the wrong power of the voltage would damp or undamp every swing."""
+    load = one_load(p_power, p_current, q_power, q_current)
+    v = size * np.exp(1j * angle)
+    r = size / 0.98
+    p = 2.0 * ((1 - p_power - p_current) * r**2 + p_current * r + p_power)
+    q = 0.5 * ((1 - q_power - q_current) * r**2 + q_current * r + q_power)
+    drawn = load.admittance[0] * v - correction(load, 0, v)
+    # A dozen roundings of numbers of size 10.
+    assert v * np.conj(drawn) == pytest.approx(p + 1j * q, abs=1e-13)
+
+
+def test_below_half_voltage_a_load_is_the_impedance_that_it_is_at_half_voltage() -> None:
+    """Constant current down to zero voltage has no direction; a jump there would shake a solver."""
+    load = one_load(0.0, 1.0, 0.0, 0.0)
+    drawn = [load.admittance[0] * v - correction(load, 0, complex(v)) for v in (0.5, 0.25)]
+    assert drawn[1] == pytest.approx(drawn[0] / 2, rel=1e-14)
+    assert abs(drawn[0].real) == pytest.approx(2.0 / 0.98, rel=1e-14)
+
+
+@pytest.mark.parametrize("transfer", [0.05j, 0.02 + 0.1j])
+def test_the_settled_voltage_satisfies_the_network_and_the_load(transfer: complex) -> None:
+    """The algebraic loop must end at its solution, not where the sweeps happened to stop."""
+    load = one_load(0.3, 0.7, 0.0, 1.0)
+    current = np.zeros(1, complex)
+    v_open = np.array([1.02 + 0.1j])
+    assert settle(load, np.array([[transfer]]), v_open, np.array([1.0 + 0j]), current)
+    v = v_open[0] + transfer * current[0]
+    # The last sweep moved less than 1e-12, and a sweep shrinks the error.
+    assert current[0] == pytest.approx(correction(load, 0, v), abs=1e-11)
+
+
+def test_loads_that_no_voltage_satisfies_are_reported() -> None:
+    """Beyond the nose of the curve there is no solution; a returned voltage would be a lie."""
+    load = one_load(1.0, 0.0, 0.0, 0.0)
+    current = np.zeros(1, complex)
+    assert not settle(load, np.array([[1.5j]]), np.array([1.0 + 0j]), np.array([1.0 + 0j]), current)
