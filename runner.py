@@ -5,6 +5,6 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent / "federates"))
 
-from tieline.cli import main  # noqa: E402
+from tieline.cli import main
 
 main()

@@ -17,10 +17,10 @@ IS_ON = os.environ.get("TIELINE_COMPILER", "on") != "off"
 
 
 def compiled(function: Function) -> Function:
-    """Return `function` compiled on first call and cached, or unchanged when the compiler is off."""
+    """Return `function` compiled on first call and cached; unchanged with the compiler off."""
     if not IS_ON:
         return function
-    return numba.njit(cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+    return numba.njit(cache=True, error_model="numpy")(function)
 
 
 def compiled_for(signature: Any) -> Callable[[Function], Function]:
@@ -33,6 +33,6 @@ def compiled_for(signature: Any) -> Callable[[Function], Function]:
     def decorate(function: Function) -> Function:
         if not IS_ON:
             return function
-        return numba.cfunc(signature, cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+        return numba.cfunc(signature, cache=True, error_model="numpy")(function)
 
     return decorate

@@ -19,7 +19,8 @@ class InputError(TielineError):
     exit_code = 2
 
     def __init__(self, findings: str | Iterable[str]) -> None:
-        self.findings: tuple[str, ...] = (findings,) if isinstance(findings, str) else tuple(findings)
+        self.findings: tuple[str, ...]
+        self.findings = (findings,) if isinstance(findings, str) else tuple(findings)
         super().__init__("\n".join(self.findings))
 
 

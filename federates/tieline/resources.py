@@ -31,4 +31,5 @@ def case_folder(name: str) -> Path:
         if (folder / "case.yaml").is_file():
             return folder.resolve()
     known = sorted(path.parent.name for path in shipped("cases").glob("*/case.yaml"))
-    raise InputError(f"no case '{name}': give one of {', '.join(known)}, or a folder with a case.yaml")
+    shown = ", ".join(known)
+    raise InputError(f"no case '{name}': give one of {shown}, or a folder with a case.yaml")

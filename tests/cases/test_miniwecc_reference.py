@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from grid.quirk import PSTessST3
 from tieline.grid.case import Case, load_case
 from tieline.grid.devices import with_pss

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 import numpy as np
+
 from tieline.grid.models.base import SIGNALS, Machine, Model
 from tieline.grid.models.registry import models
 

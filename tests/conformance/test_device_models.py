@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from conformance.examples import ALL_MODELS, EXAMPLES, evaluate, parameters, signals
 from tieline.grid.models.base import SIGNALS, Machine, Model
 from tieline.grid.models.registry import models

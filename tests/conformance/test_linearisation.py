@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+
 from conformance.examples import EXAMPLES, evaluate, parameters, signals
 from tieline.grid.models.base import Model
 from tieline.grid.models.registry import models

@@ -1,6 +1,7 @@
 """The miniWECC and a system built of it, shared by the grid's tests."""
 
 import pytest
+
 from tieline.grid.case import Case, load_case
 from tieline.grid.devices import with_pss
 from tieline.grid.powerflow import PowerFlow, solve_power_flow

@@ -1,6 +1,7 @@
 """An exciter that copies PSTess 1.1, for comparison only: never shipped."""
 
 import numpy as np
+
 from tieline.grid.models.base import Array, Equation
 from tieline.grid.models.blocks import clamp, lag_non_windup, lead_lag
 from tieline.grid.models.exciters.st3_potential import P, ST3Potential, X

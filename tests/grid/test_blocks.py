@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+
 from tieline.grid.models.blocks import clamp, lag, lag_non_windup, lead_lag, washout
 
 one = np.array([1.0])

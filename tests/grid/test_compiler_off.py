@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import numpy as np
+
 from tieline.grid.case import Case
 from tieline.grid.events import plan_events
 from tieline.grid.settings import GridSettings

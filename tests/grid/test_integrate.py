@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from tieline.grid.integrate import METHODS, late_average
 from tieline.grid.simulation import Grid
 from tieline.grid.system import System

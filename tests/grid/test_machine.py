@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from conformance.examples import EXAMPLES, evaluate, parameters, signals
 from tieline.grid.models.machines.subtransient import Subtransient, X
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy.sparse as sparse
+
 from tieline.errors import NumericalError
 from tieline.grid.case import Case
 from tieline.grid.network import admittance, factorise, islands, solve

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from tieline.errors import NumericalError
 from tieline.grid.case import Branches, Buses, Case, Loads
 from tieline.grid.powerflow import PowerFlow, solve_power_flow

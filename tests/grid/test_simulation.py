@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from tieline.errors import NumericalError
 from tieline.grid.case import Case
 from tieline.grid.events import Switching, plan_events

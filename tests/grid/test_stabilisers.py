@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from conformance.examples import evaluate, parameters, signals
 from tieline.grid.models.pss.delta_omega import DeltaOmega
 from tieline.grid.models.pss.generalized_delta_omega import GeneralizedDeltaOmega, P

@@ -1,0 +1,55 @@
+# `make demo` and `make test` do all the set-up: they need Python 3.11 to 3.13, git and make.
+
+VENV := .venv
+BIN := $(VENV)/bin
+IS_SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
+PYTHON ?= $(shell for name in python3 python3.13 python3.12 python3.11; do \
+	$$name -c '$(IS_SUPPORTED)' 2>/dev/null && echo $$name && break; done)
+PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
+
+.PHONY: help demo test lint format wheel clean
+
+help:
+	@echo "make demo    run the trip of G26 under six delays, with a table and plots"
+	@echo "make test    run every test"
+	@echo "make lint    check style and types"
+	@echo "make format  bring every file into the house's format"
+	@echo "make wheel   build the wheel and the source distribution into dist/"
+	@echo "make clean   remove the environment and everything that was built"
+
+demo: $(VENV)/runtime
+	$(BIN)/tieline run g26_trip
+
+test: $(VENV)/development
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/development
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(VENV)/development
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+wheel: $(VENV)/development
+	$(BIN)/python -m build
+
+$(VENV)/created:
+	@test -n "$(PYTHON)" || { echo "tieline needs Python 3.11, 3.12 or 3.13; none was found" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+$(VENV)/runtime: pyproject.toml | $(VENV)/created
+	@echo "Installing tieline and what it needs into $(VENV) (a minute or two, once)"
+	$(PIP) --editable .
+	@touch $@
+
+$(VENV)/development: pyproject.toml | $(VENV)/created
+	@echo "Installing tieline and its tools into $(VENV) (a minute or two, once)"
+	$(PIP) --editable '.[dev]'
+	@touch $@ $(VENV)/runtime
+
+clean:
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find federates tests -name __pycache__ -type d -prune -exec rm -rf {} +

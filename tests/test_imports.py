@@ -1,0 +1,73 @@
+"""Who may import whom."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import tieline
+
+ROOT = Path(tieline.__file__).parent
+MODULES = sorted(ROOT.rglob("*.py"))
+
+
+def imports(path: Path) -> set[str]:
+    """Return the full names of what a module imports, wherever in it."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def begins(names: set[str], *prefixes: str) -> set[str]:
+    return {n for n in names if any(n == p or n.startswith(f"{p}.") for p in prefixes)}
+
+
+def part(name: str) -> list[Path]:
+    return [path for path in MODULES if path.relative_to(ROOT).parts[0] == name]
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_only_cosim_imports_helics(path: Path) -> None:
+    """HELICS in a second place would mean a second set of its traps."""
+    if path not in part("cosim"):
+        assert not begins(imports(path), "helics")
+
+
+@pytest.mark.parametrize(("one", "other"), [("grid", "network"), ("network", "grid")])
+def test_grid_and_network_never_import_each_other(one: str, other: str) -> None:
+    """They meet in the federation only; a short cut would carry a packet past the network."""
+    for path in part(one):
+        assert not begins(imports(path), f"tieline.{other}"), path
+
+
+def test_the_network_specification_knows_no_engine() -> None:
+    """One specification must serve every engine."""
+    engines = ("ideal", "packet", "engine", "ns3")
+    names = imports(ROOT / "network" / "spec.py")
+    assert not begins(names, *(f"tieline.network.{engine}" for engine in engines))
+
+
+def test_the_launcher_starts_federates_and_does_not_import_them() -> None:
+    """A federate inside the launcher could not be killed when it hangs."""
+    for path in part("experiment"):
+        forbidden = ("tieline.grid.federate", "tieline.network.federate", "tieline.cosim.together")
+        assert not begins(imports(path), *forbidden), path
+
+
+@pytest.mark.parametrize("name", ["report", "plots", "summary", "table"])
+def test_what_reports_reads_result_folders_only(name: str) -> None:
+    """A report that reached into a simulation could show what no folder holds."""
+    names = imports(ROOT / "experiment" / f"{name}.py")
+    assert not begins(names, "tieline.grid", "tieline.network", "tieline.cosim", "tieline.wams")
+
+
+def test_floats_and_nanoseconds_meet_in_units_alone() -> None:
+    """A second conversion is a second rounding."""
+    conversion = re.compile(r"[*/]\s*1e-?9\b")
+    for path in [*part("grid"), *part("network"), *part("wams"), *part("cosim")]:
+        assert not conversion.search(path.read_text(encoding="utf-8")), path
