@@ -6,12 +6,19 @@ not depend on how a compiler reorders sums.
 """
 
 import os
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any, TypeVar
 
 import numba
+from numba.core.errors import NumbaExperimentalFeatureWarning
+from numba.typed import List
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+# numba calls first-class functions experimental at each compilation that sees one.
+warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
 IS_ON = os.environ.get("TIELINE_COMPILER", "on") != "off"
 
@@ -23,16 +30,21 @@ def compiled(function: Function) -> Function:
     return numba.njit(cache=True, error_model="numpy")(function)
 
 
-def compiled_for(signature: Any) -> Callable[[Function], Function]:
-    """Return a decorator that compiles at once for `signature`, giving a first-class function.
+def first_class(functions: Sequence[Callable[..., None]], signature: Any) -> Any:
+    """Return functions of one signature as a list that compiled code can call by index.
 
-    Functions of one signature can be held in a tuple and called by index from compiled code,
-    which is then compiled once, whatever the functions are.
+    The caller is then compiled once, whatever the functions are. A typed list tells the compiled
+    caller its type at once; a plain tuple would have every function's type worked out anew at each
+    call, which costs more than a step of the grid.
     """
+    if not IS_ON:
+        return tuple(functions)
+    result = List.empty_list(numba.types.FunctionType(signature))
+    for function in functions:
+        result.append(_first_class(function, signature))
+    return result
 
-    def decorate(function: Function) -> Function:
-        if not IS_ON:
-            return function
-        return numba.cfunc(signature, cache=True, error_model="numpy")(function)
 
-    return decorate
+@cache
+def _first_class(function: Callable[..., None], signature: Any) -> Any:
+    return numba.cfunc(signature, cache=True, error_model="numpy")(function)

@@ -1,13 +1,10 @@
 """Each control model's linearisation against the transfer function of its diagram."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
-from conformance.examples import EXAMPLES, evaluate, parameters, signals
+from conformance.examples import ALL_MODELS, evaluate, parameters, signals
 from tieline.grid.models.base import Model
-from tieline.grid.models.registry import models
 
 STEP = 1e-6
 
@@ -34,52 +31,22 @@ def transfer(model: type[Model], given: str, got: str, s: complex) -> complex:
     return jacobian[n] @ states + b[n]
 
 
-def lead_lag(s: complex, T1: float, T2: float) -> complex:
-    return (1 + s * T1) / (1 + s * T2)
-
-
-def stabiliser(s: complex) -> complex:
-    e = EXAMPLES["delta_omega"]
-    washout = s * e["Tw"] / (1 + s * e["Tw"])
-    return e["K"] * washout * lead_lag(s, e["T1"], e["T2"]) * lead_lag(s, e["T3"], e["T4"])
-
-
-def governor(s: complex) -> complex:
-    e = EXAMPLES["reheat_hydro"]
-    shape = lead_lag(s, e["T3"], e["Tc"]) * lead_lag(s, e["T4"], e["T5"])
-    return -e["K"] / (1 + s * e["Ts"]) * shape
-
-
-def exciter(s: complex) -> complex:
-    e = EXAMPLES["st3_potential"]
-    return lead_lag(s, e["TC"], e["TB"]) * e["KA"] / (1 + s * e["TA"]) * e["KP"] * 1.02
-
-
-BETA1, BETA2 = 1.0, 0.5
-
-CASES = [
-    ("pss", "delta_omega", "omega", "v_s", stabiliser),
-    ("pss", "generalized_delta_omega", "omega", "v_s", lambda s: BETA1 * stabiliser(s)),
-    ("pss", "generalized_delta_omega", "wbar", "v_s", lambda s: (BETA2 - BETA1) * stabiliser(s)),
-    ("governor", "reheat_hydro", "omega", "Pm", governor),
-    ("exciter", "st3_potential", "v_s", "Efd", exciter),
-    ("exciter", "st3_potential", "Vref", "Efd", exciter),
-]
-
-
 @pytest.mark.parametrize("frequency_hz", [0.02, 0.4, 1.5])
-@pytest.mark.parametrize(("role", "key", "given", "got", "expected"), CASES)
+@pytest.mark.parametrize("model", ALL_MODELS, ids=lambda model: model.key)
 def test_the_linearisation_is_the_declared_transfer_function(
-    role: str,
-    key: str,
-    given: str,
-    got: str,
-    expected: Callable[[complex], complex],
-    frequency_hz: float,
+    model: type[Model], frequency_hz: float
 ) -> None:
     """A wrong sign or a swapped time constant would turn damping into excitation."""
     s = 2j * np.pi * frequency_hz
-    # The equations are linear inside their limits; differences of 1e-6 leave 1e-9 of rounding,
-    # times gains up to K_A / T_A = 1e4.
-    got_value = transfer(models(role)[key], given, got, s)
-    assert got_value == pytest.approx(expected(s), rel=1e-5)
+    at = {name: float(value[0]) for name, value in signals(1).items()}
+    for (given, got), declared in model.transfer(s, model.example, at).items():
+        # The equations are linear inside their limits; differences of 1e-6 leave 1e-9 of rounding,
+        # times gains up to K_A / T_A = 1e4.
+        assert transfer(model, given, got, s) == pytest.approx(declared, rel=1e-5), (given, got)
+
+
+@pytest.mark.parametrize("model", ALL_MODELS, ids=lambda model: model.key)
+def test_every_control_declares_a_transfer_function(model: type[Model]) -> None:
+    """A control that declared none would never be held against its diagram."""
+    at = {name: float(value[0]) for name, value in signals(1).items()}
+    assert bool(model.transfer(1j, model.example, at)) is (model.role != "machine")

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from conformance.examples import EXAMPLES, evaluate, parameters, signals
+from conformance.examples import evaluate, parameters, signals
 from tieline.grid.models.machines.subtransient import Subtransient, X
 
-e = EXAMPLES["subtransient"]
+e = Subtransient.example
 
 
 def test_at_rest_the_terminal_power_follows_the_power_angle_formula() -> None:

@@ -78,9 +78,9 @@ def busy_ring() -> NetworkSpec:
     """Return four nodes in a ring that overload, lose, re-order and delay at every stage."""
     links = [
         Link("a", "b", 2_000_000, 700_000, 20, 0.02, UniformJitter(0, 400_000), 9),
-        Link("b", "c", 1_500_000, 900_000, 15, 0.0, NormalJitter(200_000, 90_000), 9),
+        Link("b", "c", 1_500_000, 900_000, 5, 0.0, NormalJitter(200_000, 90_000), 9),
         Link("c", "d", 2_500_000, 600_000, 30, 0.05, GammaJitter(100_000, 150_000), 9),
-        Link("a", "d", 1_000_000, 800_000, 10, 0.0, None, 9),
+        Link("a", "d", 1_000_000, 800_000, 3, 0.0, None, 9),
     ]
     sources = [
         Source("p0", 1, "a", 3_000_000, UniformJitter(0, 2_000_000)),

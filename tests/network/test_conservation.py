@@ -42,13 +42,12 @@ def networks(draw: st.DrawFn) -> NetworkSpec:
         Destination(f"c{j}", f"G{j}", j, draw(place), 500_000 * j)
         for j in range(draw(st.integers(0, 3)))
     ]
+    kinds = st.sampled_from(["cbr", "poisson"])
+    rates = st.sampled_from([20_000.0, 900_000.0])
+    plans = draw(st.lists(st.tuples(kinds, rates, place, place), max_size=2))
     cross = [
-        CrossFlow(
-            f"cross flow {c}", kind, draw(st.sampled_from([20_000.0, 900_000.0])), 300, (a, b)
-        )
-        for c, (kind, a, b) in enumerate(
-            draw(st.lists(st.tuples(st.sampled_from(["cbr", "poisson"]), place, place), max_size=2))
-        )
+        CrossFlow(f"cross flow {c}", kind, rate, 300, (a, b))
+        for c, (kind, rate, a, b) in enumerate(plans)
         if a != b
     ]
     return joined(links, sources, destinations, cross)

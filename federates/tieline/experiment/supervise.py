@@ -69,7 +69,6 @@ class Child:
 
     def __init__(self, name: str, command: Sequence[str], log: Path) -> None:
         self.name = name
-        self.log = Log(log)
         self.exit_code: int | None = None
         self.use: ProcessUse | None = None
         self._process = subprocess.Popen(
@@ -80,6 +79,7 @@ class Child:
             env=_environment(),
             start_new_session=True,
         )
+        self.log = Log(log)
         assert self._process.stdout is not None
         assert self._process.stderr is not None
         self._pending = {self._process.stdout.fileno(): b"", self._process.stderr.fileno(): b""}

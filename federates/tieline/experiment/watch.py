@@ -67,6 +67,7 @@ class Watch:
         before = self._last.get(name, {})
         self._last[name] = dict(message)
         if _place(message) != _place(before) or self._works(name, message):
+            self._cpu_s[name] = _cpu_s(message)
             self.silence_s = 0.0
         if name not in FEDERATES:
             return None
@@ -104,11 +105,7 @@ class Watch:
 
     def _works(self, name: str, message: Mapping[str, Any]) -> bool:
         may_be_long = message["state"] in ("opening", "finishing") or message.get("k") == 0
-        cpu_s = float(message.get("cpu_s", 0.0))
-        if not may_be_long or cpu_s - self._cpu_s.get(name, 0.0) < _LEAST_CPU_S:
-            return False
-        self._cpu_s[name] = cpu_s
-        return True
+        return may_be_long and _cpu_s(message) - self._cpu_s[name] >= _LEAST_CPU_S
 
     def _failed_by_itself(self) -> Suspect | None:
         for name in FEDERATES:
@@ -184,6 +181,10 @@ class Watch:
 
 def _place(message: Mapping[str, Any]) -> tuple[Any, Any]:
     return message.get("state"), message.get("k")
+
+
+def _cpu_s(message: Mapping[str, Any]) -> float:
+    return float(message.get("cpu_s", 0.0))
 
 
 def _members(name: str) -> Sequence[str]:

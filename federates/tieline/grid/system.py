@@ -8,12 +8,13 @@ import numpy as np
 import scipy.sparse as sparse
 from numpy.typing import NDArray
 
+from tieline.compiled import first_class
 from tieline.grid.case import Case
 from tieline.grid.devices import Group, groups
 from tieline.grid.equations import rhs
 from tieline.grid.initialise import initial_states, require_rest
 from tieline.grid.loads import load_currents, load_transfer, nominal_admittance
-from tieline.grid.models.base import SIGNALS, Equation, Machine, Model, first_class
+from tieline.grid.models.base import SIGNALS, SIGNATURE, Equation, Machine, Model
 from tieline.grid.network import admittance, factorise
 from tieline.grid.plan import ROTORS, SENSORS, Average, Jobs, Plan, Work
 from tieline.grid.powerflow import PowerFlow
@@ -37,7 +38,7 @@ class System:
     case: Case
     flow: PowerFlow
     groups: tuple[Group, ...]
-    functions: tuple[Any, ...]
+    functions: Any
     plan: Plan
     x0: Floats
     labels: tuple[str, ...]
@@ -139,7 +140,7 @@ def _schedule(found: Sequence[Group]) -> tuple[list[tuple[int, Equation]], int]:
     return [*sources, *terminals, *controls, *motions], len(sources)
 
 
-def _jobs(found: Sequence[Group], x0_of: Integers) -> tuple[Jobs, tuple[Any, ...]]:
+def _jobs(found: Sequence[Group], x0_of: Integers) -> tuple[Jobs, Any]:
     schedule, before_network = _schedule(found)
     functions: list[Callable[..., None]] = []
     for _, equation in schedule:
@@ -172,7 +173,7 @@ def _jobs(found: Sequence[Group], x0_of: Integers) -> tuple[Jobs, tuple[Any, ...
         before_network=before_network,
         parameters=np.concatenate([group.p.ravel() for group in found]),
     )
-    return jobs, tuple(first_class(function) for function in functions)
+    return jobs, first_class(functions, SIGNATURE)
 
 
 def _machine_admittance(case: Case, found: Sequence[Group]) -> NDArray[np.complex128]:

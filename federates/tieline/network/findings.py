@@ -98,7 +98,7 @@ class Findings:
 
 def nearest(given: Any, allowed: Collection[str]) -> str:
     """Return ` (did you mean 'x'?)` for the nearest allowed word, or the whole short list."""
-    matches = get_close_matches(str(given), allowed, n=1, cutoff=0.5)
+    matches = get_close_matches(str(given), allowed, n=1)
     if matches:
         return f" (did you mean '{matches[0]}'?)"
     return f" (allowed: {', '.join(allowed)})" if len(allowed) <= 12 else ""

@@ -20,14 +20,11 @@ Inputs and outputs are names of signals, one value a unit:
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, ClassVar
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
-
-from tieline.compiled import compiled_for
 
 Array = NDArray[np.float64]
 
@@ -101,6 +98,8 @@ class Model:
         parameters, states: the rows of `p` and `x`.
         equations: evaluated in order once the terminal voltages are known; a machine's last one
             comes after all controls.
+        example: one parameter set by symbol, from `example_source`; every check in the house runs
+            on it.
     """
 
     key: ClassVar[str]
@@ -109,6 +108,19 @@ class Model:
     parameters: ClassVar[tuple[Parameter, ...]]
     states: ClassVar[tuple[str, ...]]
     equations: ClassVar[tuple[Equation, ...]]
+    example: ClassVar[Mapping[str, float]]
+    example_source: ClassVar[str]
+
+    @classmethod
+    def transfer(
+        cls, s: complex, p: Mapping[str, float], at: Mapping[str, float]
+    ) -> dict[tuple[str, str], complex]:
+        """Return the declared transfer functions at `s`, by (input, output) signal.
+
+        They hold inside all limits, for one unit with parameters `p` by symbol, around the signals
+        `at` by name. Tests hold the linearised equations against them. A machine declares none.
+        """
+        return {}
 
     @classmethod
     def check(cls, values: Mapping[str, float]) -> list[str]:
@@ -149,9 +161,3 @@ def indices(names: Sequence[str] | Sequence[Parameter]) -> Any:
     """Return a named tuple that gives each name its row: `P.KA` is a compile-time number."""
     words = [name.symbol if isinstance(name, Parameter) else name for name in names]
     return namedtuple("Rows", words)(*range(len(words)))
-
-
-@cache
-def first_class(function: Callable[..., None]) -> Any:
-    """Return an equation's function in the form that the compiled integrator calls."""
-    return compiled_for(SIGNATURE)(function)

@@ -29,6 +29,11 @@ def lead_lag(u: Array, x: Array, T1: Array, T2: Array) -> tuple[Array, Array]:
     return x + T1 * rate, rate
 
 
+def lead_lag_at(s: complex, T1: float, T2: float) -> complex:
+    """Return (1 + s T1) / (1 + s T2), for declared transfer functions."""
+    return (1 + s * T1) / (1 + s * T2)
+
+
 @compiled
 def lag(u: Array, x: Array, T: Array) -> tuple[Array, Array]:
     """Return output and derivative of 1 / (1 + s T)."""

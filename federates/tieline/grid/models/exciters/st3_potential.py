@@ -1,9 +1,12 @@
 """The potential-source static exciter of the miniWECC: the ST3A family without its inner loop."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import numpy as np
 
 from tieline.grid.models.base import Array, Equation, Model, Parameter, indices
-from tieline.grid.models.blocks import clamp, lag_non_windup, lead_lag
+from tieline.grid.models.blocks import clamp, lag_non_windup, lead_lag, lead_lag_at
 from tieline.grid.models.limits import require_within
 
 PARAMETERS = (
@@ -52,7 +55,23 @@ class ST3Potential(Model):
     )
     parameters = PARAMETERS
     states = STATES
+    example = MappingProxyType(
+        {
+            "KA": 200.0, "TA": 0.02, "TB": 10.0, "TC": 1.0, "VImax": 0.1, "VImin": -0.1,
+            "VRmax": 5.0, "VRmin": -5.0, "KP": 1.0, "Efdmax": 5.0,
+        }
+    )  # fmt: skip
+    example_source = "every unit of the miniWECC (Trudnowski 2011)"
     equations = (Equation(equations, ("vt", "v_s", "Vref"), ("Efd",)),)
+
+    @classmethod
+    def transfer(
+        cls, s: complex, p: Mapping[str, float], at: Mapping[str, float]
+    ) -> dict[tuple[str, str], complex]:
+        """Return E_fd over v_s and over V_ref."""
+        forward = lead_lag_at(s, p["TC"], p["TB"]) * p["KA"] / (1 + s * p["TA"])
+        forward *= p["KP"] * at["vt"]
+        return {("v_s", "Efd"): forward, ("Vref", "Efd"): forward}
 
     @classmethod
     def initialise(cls, signals: dict[str, Array], p: Array) -> Array:

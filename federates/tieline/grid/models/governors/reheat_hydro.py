@@ -1,9 +1,12 @@
 """The three-stage turbine governor: reheat steam, hydro or gas turbine by its constants."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import numpy as np
 
 from tieline.grid.models.base import Array, Equation, Model, Parameter, indices
-from tieline.grid.models.blocks import clamp, lag, lead_lag
+from tieline.grid.models.blocks import clamp, lag, lead_lag, lead_lag_at
 from tieline.grid.models.limits import require_within
 
 PARAMETERS = (
@@ -43,7 +46,20 @@ class ReheatHydro(Model):
     source = "Kundur 1994, section 9.2 and 9.1; governor of the miniWECC (Trudnowski 2011)"
     parameters = PARAMETERS
     states = STATES
+    example = MappingProxyType(
+        {"K": 20.0, "Tmax": 1.0, "Ts": 0.5, "Tc": 15.0, "T3": 1.0, "T4": -1.0, "T5": 0.5}
+    )
+    example_source = "slow hydro unit of the miniWECC (Trudnowski 2011)"
     equations = (Equation(equations, ("omega", "Pref", "w0"), ("Pm",)),)
+
+    @classmethod
+    def transfer(
+        cls, s: complex, p: Mapping[str, float], at: Mapping[str, float]
+    ) -> dict[tuple[str, str], complex]:
+        """Return P_m over speed and over P_ref."""
+        shape = lead_lag_at(s, p["T3"], p["Tc"]) * lead_lag_at(s, p["T4"], p["T5"])
+        shape /= 1 + s * p["Ts"]
+        return {("omega", "Pm"): -p["K"] * shape, ("Pref", "Pm"): shape}
 
     @classmethod
     def initialise(cls, signals: dict[str, Array], p: Array) -> Array:

@@ -1,6 +1,7 @@
 """The subtransient synchronous machine, round rotor and salient pole alike, without saturation."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,6 +121,14 @@ class Subtransient(Machine):
     source = "Kundur, Power System Stability and Control, 1994, sections 3.4 to 3.6 and 13.3"
     parameters = PARAMETERS
     states = STATES
+    example = MappingProxyType(
+        {
+            "H": 6.5, "D": 0.0, "ra": 0.003, "xl": 0.17, "xd": 2.0, "xd_p": 0.2, "xd_pp": 0.18,
+            "Td0_p": 7.5, "Td0_pp": 0.025, "xq": 1.9, "xq_p": 0.7, "xq_pp": 0.18, "Tq0_p": 0.5,
+            "Tq0_pp": 0.06,
+        }
+    )  # fmt: skip
+    example_source = "steam unit of the miniWECC (Trudnowski 2011), with a resistance added"
     norton = Equation(norton, (), ("Epp_re", "Epp_im", "omega", "delta"))
     equations = (
         Equation(electrical, ("v_re", "v_im"), ("Pe", "Ifd")),

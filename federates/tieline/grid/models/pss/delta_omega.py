@@ -1,10 +1,13 @@
 """The standard delta-omega power system stabiliser."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import numpy as np
 
 from tieline.compiled import compiled
 from tieline.grid.models.base import Array, Equation, Model, Parameter, indices
-from tieline.grid.models.blocks import clamp, lead_lag, washout
+from tieline.grid.models.blocks import clamp, lead_lag, lead_lag_at, washout
 
 PARAMETERS = (
     Parameter("K", "pu", "gain", at_least=0),
@@ -31,6 +34,12 @@ def compensate(nu: Array, x: Array, p: Array, dx: Array) -> Array:
     return clamp(second, p[P.vsmin], p[P.vsmax])
 
 
+def compensation(s: complex, p: Mapping[str, float]) -> complex:
+    """Return v_s over the control error at `s`, inside the limits."""
+    washed = p["K"] * s * p["Tw"] / (1 + s * p["Tw"])
+    return washed * lead_lag_at(s, p["T1"], p["T2"]) * lead_lag_at(s, p["T3"], p["T4"])
+
+
 def equations(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
     """Write v_s from the unit's own speed deviation."""
     y[0] = compensate(u[0] - u[1], x, p, dx)
@@ -49,7 +58,21 @@ class DeltaOmega(Model):
     source = "Kundur 1994, section 12.5; IEEE Std 421.5-2016, type PSS1A with A1 = A2 = T6 = 0"
     parameters = PARAMETERS
     states = STATES
+    example = MappingProxyType(
+        {
+            "K": 9.0, "Tw": 10.0, "T1": 0.25, "T2": 0.04, "T3": 0.2, "T4": 0.03,
+            "vsmax": 0.1, "vsmin": -0.1,
+        }
+    )  # fmt: skip
+    example_source = "miniWECC (Trudnowski 2011) with the gain of the paper's trip of G26"
     equations = (Equation(equations, ("omega", "w0"), ("v_s",)),)
+
+    @classmethod
+    def transfer(
+        cls, s: complex, p: Mapping[str, float], at: Mapping[str, float]
+    ) -> dict[tuple[str, str], complex]:
+        """Return v_s over speed."""
+        return {("omega", "v_s"): compensation(s, p)}
 
     @classmethod
     def initialise(cls, signals: dict[str, Array], p: Array) -> Array:

@@ -1,5 +1,8 @@
 """The generalised delta-omega power system stabiliser of Elliott, Arabshahi and Kirschen."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import numpy as np
 
 from tieline.grid.models.base import Array, Equation, Model, Parameter, indices
@@ -41,7 +44,20 @@ class GeneralizedDeltaOmega(Model):
     )
     parameters = PARAMETERS
     states = delta_omega.STATES
+    example = MappingProxyType({**delta_omega.DeltaOmega.example, "beta1": 1.0, "beta2": 0.5})
+    example_source = "the paper's trip of G26, tuned to the inter-area modes"
     equations = (Equation(equations, ("omega", "wbar", "w0"), ("v_s",)),)
+
+    @classmethod
+    def transfer(
+        cls, s: complex, p: Mapping[str, float], at: Mapping[str, float]
+    ) -> dict[tuple[str, str], complex]:
+        """Return v_s over the unit's speed and over the average."""
+        forward = delta_omega.compensation(s, p)
+        return {
+            ("omega", "v_s"): p["beta1"] * forward,
+            ("wbar", "v_s"): (p["beta2"] - p["beta1"]) * forward,
+        }
 
     @classmethod
     def initialise(cls, signals: dict[str, Array], p: Array) -> Array:

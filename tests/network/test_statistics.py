@@ -1,0 +1,113 @@
+"""Delay statistics whose memory does not grow, against the same figures from every delay."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tieline.network.engine import ARRIVAL, DROP, LOSS, NO_DROPS, QUEUE_FULL, Outcome
+from tieline.network.histogram import BINS, bin_of, middle_ns, percentile_ns
+from tieline.network.stats import DELAY_BIN_NS, FlowStatistics
+from tieline.streams import stream
+
+LEAST_NS = 95_000_000
+
+
+def arrivals_of(delays_ns: np.ndarray) -> np.ndarray:
+    """Return arrivals of one flow of these delays, measured at zero."""
+    records = np.zeros(len(delays_ns), ARRIVAL)
+    records["arrival_ns"] = delays_ns
+    records["sequence"] = np.arange(len(delays_ns))
+    return records
+
+
+def statistics_of(delays_ns: np.ndarray, least_ns: int = LEAST_NS) -> FlowStatistics:
+    """Return the statistics of one flow of these delays, added a few at a time."""
+    statistics = FlowStatistics(np.array([least_ns]), np.array([[0]]))
+    for part in np.array_split(arrivals_of(delays_ns), 7):
+        statistics.add(Outcome(part, NO_DROPS), np.zeros(len(part), np.int64))
+    return statistics
+
+
+# The first example compiles, so no deadline holds.
+@settings(deadline=None)
+@given(st.integers(0, 2**42))
+def test_a_bin_holds_what_lies_in_it(excess_ns):
+    """Otherwise percentiles would be off by more than they state."""
+    number = bin_of(excess_ns)
+    assert 0 <= number < BINS
+    assert abs(middle_ns(number) - excess_ns) <= max(512, excess_ns / 128)
+
+
+def test_bins_follow_one_another_without_gap():
+    """Otherwise two delays would share a bin that no delay between them falls into."""
+    edges = [0, 1023, 1024, 128 * 1024 - 1, 128 * 1024, 130 * 1024 - 1, 130 * 1024]
+    assert [bin_of(edge) for edge in edges] == [0, 0, 1, 127, 128, 128, 129]
+    assert (bin_of(-5), bin_of(2**62)) == (0, BINS - 1)
+
+
+def test_figures_of_a_flow_equal_those_of_all_its_delays():
+    """Otherwise the tables would not describe the packets."""
+    excess_ns = np.rint(stream(1, "delays").gamma(2.0, 2e6, 50_000)).astype(np.int64)
+    delays_ns = LEAST_NS + excess_ns
+    statistics = statistics_of(delays_ns)
+    assert statistics.delivered.tolist() == [50_000]
+    assert statistics.mean_ns()[0] == pytest.approx(delays_ns.mean(), rel=1e-12)
+    assert statistics.min_ns()[0] == delays_ns.min()
+    assert statistics.max_ns()[0] == delays_ns.max()
+    assert statistics.jitter_ns()[0] == pytest.approx(np.abs(np.diff(delays_ns)).mean(), rel=1e-12)
+    for share in (0.01, 0.5, 0.95, 0.999, 1.0):
+        rank = int(np.ceil(share * len(delays_ns))) - 1
+        exact_ns = np.sort(delays_ns)[rank]
+        tolerance_ns = max(512, (exact_ns - LEAST_NS) / 128)
+        assert abs(statistics.percentiles_ns(share)[0] - exact_ns) <= tolerance_ns
+
+
+def test_a_constant_delay_has_exact_percentiles():
+    """Otherwise the constant engine would be reported with a delay that nobody set."""
+    statistics = statistics_of(np.full(100, LEAST_NS))
+    assert statistics.percentiles_ns(0.5)[0] == statistics.percentiles_ns(0.95)[0] == LEAST_NS
+    assert statistics.jitter_ns()[0] == 0
+
+
+def test_the_histogram_of_all_flows_counts_every_delay():
+    """Otherwise the picture of the delays would lack some of them."""
+    delays_ns = np.array([0, 99_999, 100_000, 250_000_000, 20_000_000_000, 10**12])
+    counts = statistics_of(delays_ns, least_ns=0).delay_counts
+    bins = [min(delay // DELAY_BIN_NS, len(counts) - 1) for delay in delays_ns]
+    assert np.array_equal(np.flatnonzero(counts), sorted(set(bins)))
+    assert counts.sum() == len(delays_ns)
+
+
+def test_nothing_delivered_has_no_delay():
+    """Otherwise a dead flow would be reported with a delay of zero."""
+    statistics = FlowStatistics(np.array([LEAST_NS]), np.array([[0]]))
+    for figure in ("mean_ns", "min_ns", "max_ns", "jitter_ns"):
+        assert np.isnan(getattr(statistics, figure)()[0])
+    assert np.isnan(statistics.percentiles_ns(0.5)[0])
+
+
+def test_packets_are_counted_where_they_end():
+    """Otherwise losses would be blamed on queues, or on other flows."""
+    statistics = FlowStatistics(np.array([0] * 4), np.arange(4).reshape(2, 2))
+    statistics.add_sent(np.array([0, 1]))
+    drops = np.zeros(3, DROP)
+    drops["source"] = [0, 1, 1]
+    drops["destination"] = [1, 0, 0]
+    drops["reason"] = [QUEUE_FULL, LOSS, LOSS]
+    statistics.sent[2] += 1
+    statistics.add(Outcome(arrivals_of(np.array([5])), drops), np.zeros(1, np.int64))
+    assert statistics.sent.tolist() == [1, 1, 2, 1]
+    assert statistics.dropped_queue.tolist() == [0, 1, 0, 0]
+    assert statistics.dropped_loss.tolist() == [0, 0, 2, 0]
+    assert statistics.delivered.tolist() == [1, 0, 0, 0]
+    assert statistics.in_flight.tolist() == [0, 0, 0, 1]
+
+
+def test_the_nearest_rank_of_few_counts():
+    """Otherwise the percentile of a short run would lie between packets, or outside them."""
+    counts = np.zeros(BINS, dtype=np.uint32)
+    counts[[3, 10]] = [1, 3]
+    assert percentile_ns(counts, 0.25) == middle_ns(3)
+    assert percentile_ns(counts, 0.26) == middle_ns(10)
+    assert percentile_ns(counts, 1.0) == middle_ns(10)
