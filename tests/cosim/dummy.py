@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from tieline.cosim import wire
-from tieline.cosim.federate import main
 from tieline.cosim.interfaces import GRID, NETWORK
 from tieline.cosim.together import main as main_together
 
@@ -48,11 +47,13 @@ class Dummy:
         self._digest = hashlib.sha256(self._digest + received).digest()
         if k == self._options.get("fault_at"):
             self._err(self._options["fault"])
-        time.sleep(self._pauses.random() * self._options.get("pause_s", 0.0))
+        if "pause_s" in self._options:
+            time.sleep(self._pauses.random() * self._options["pause_s"])
         return self._message()
 
     def finish(self) -> None:
-        """Write down what was received."""
+        """Write down what was received, and whether HELICS was there."""
+        (self._folder / "helics").write_text(str("helics" in sys.modules))
         (self._folder / f"{self.name}.digest").write_text(self._digest.hex())
 
     def abort(self, reason: str) -> None:
@@ -85,7 +86,9 @@ def open_dummy(name: str, run: dict[str, Any], folder: Path) -> Dummy:
     return Dummy(name, folder, options)
 
 
-def write_run(folder: Path, core: str, intervals: int, dummies: dict[str, Any], **timeouts: float) -> None:
+def write_run(
+    folder: Path, core: str, intervals: int, dummies: dict[str, Any], **timeouts: float
+) -> None:
     """Write a run file for dummies into a folder that this makes."""
     folder.mkdir(parents=True, exist_ok=True)
     run = {
@@ -99,9 +102,12 @@ def write_run(folder: Path, core: str, intervals: int, dummies: dict[str, Any], 
 if __name__ == "__main__":
     role = sys.argv.pop(1)
     openers = {
-        name: lambda run, folder, name=name: open_dummy(name, run, folder) for name in (GRID, NETWORK)
+        name: lambda run, folder, name=name: open_dummy(name, run, folder)
+        for name in (GRID, NETWORK)
     }
     if role == "together":
         main_together(openers)
     else:
+        from tieline.cosim.federate import main
+
         main(role, openers[role])

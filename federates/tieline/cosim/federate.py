@@ -1,23 +1,27 @@
 """One federate as a process: opens its participant, joins the federation and ends with a code."""
 
-import json
 import os
 import sys
 import threading
 import traceback
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from tieline.cosim.exchange import SIDES, Exchange
 from tieline.cosim.guard import GuardedParticipant
-from tieline.cosim.interfaces import Clock, FederationSettings, Participant
+from tieline.cosim.interfaces import Clock, OpenParticipant
 from tieline.cosim.link import FederationEndedError, HelicsLink
-from tieline.cosim.process import die_with_launcher, on_termination, signals_held
+from tieline.cosim.process import (
+    die_with_launcher,
+    end_process,
+    exit_code_of,
+    on_termination,
+    reason_of,
+    signals_held,
+)
+from tieline.cosim.runfile import federation_of, read_run
 from tieline.cosim.status import Fault, Heartbeat, Status
-from tieline.errors import CosimError, InputError, TielineError
-
-OpenParticipant = Callable[[dict[str, Any], Path], Participant]
+from tieline.errors import CosimError
 
 _STDOUT = 1
 _TELL_S = 1.0
@@ -125,58 +129,6 @@ def main(name: str, open_participant: OpenParticipant) -> None:
     with Heartbeat([status]):
         code = federate.serve(open_participant)
     end_process(code)
-
-
-def read_run(argv: list[str]) -> tuple[dict[str, Any], Path]:
-    """Return the run file's content and its folder.
-
-    Raises:
-        SystemExit: there is no such argument or file, or it is no JSON.
-    """
-    try:
-        if len(argv) != 2:
-            raise InputError(
-                f"usage: {Path(argv[0]).name} RUN.json (got {len(argv) - 1} arguments)"
-            )
-        path = Path(argv[1])
-        return json.loads(path.read_text(encoding="utf-8")), path.resolve().parent
-    except (InputError, OSError, json.JSONDecodeError) as error:
-        sys.stderr.write(f"cannot read the run file: {error}\n")
-        raise SystemExit(InputError.exit_code) from error
-
-
-def federation_of(run: dict[str, Any]) -> tuple[FederationSettings, int | None]:
-    """Return a run's federation settings and its broker's port."""
-    stated = dict(run["federation"])
-    port = stated.pop("broker_port", None)
-    return FederationSettings(**stated), port
-
-
-def reason_of(error: BaseException) -> str:
-    """Return a failure's message, with its class where it is none of tieline's."""
-    if isinstance(error, TielineError):
-        return str(error)
-    return f"{type(error).__name__}: {error}"
-
-
-def exit_code_of(error: BaseException) -> int:
-    """Return the exit code that stands for an exception."""
-    return error.exit_code if isinstance(error, TielineError) else TielineError.exit_code
-
-
-def end_process(code: int) -> None:
-    """End this process.
-
-    After a failure it ends at once: HELICS waits for lost peers in its own clean-up.
-
-    Raises:
-        SystemExit: the code is 0.
-    """
-    sys.stdout.flush()
-    sys.stderr.flush()
-    if code:
-        os._exit(code)
-    raise SystemExit(0)
 
 
 def _verdict(error: Exception) -> tuple[str, Fault]:

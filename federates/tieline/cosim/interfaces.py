@@ -1,7 +1,9 @@
 """What crosses the border between the federates: names, clock, bundles, the participant's shape."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from pathlib import Path
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +83,10 @@ class Participant(Protocol):
 
     def abort(self, reason: str) -> None:
         """Save what there is; the federation ends early."""
+
+
+OpenParticipant = Callable[[dict[str, Any], Path], Participant]
+"""Makes a participant from the run file's content and the run folder."""
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ time step of 1 ns get exactly the times that they ask for, and a tick of 500 ms 
 """
 
 import sys
+import time
+from typing import Any
 
 import helics
 
@@ -20,6 +22,7 @@ _HOST = "127.0.0.1"
 _WATCH = "--tick=500ms --timeout=2s --loglevel=warning"
 _ERROR_CODE = CosimError.exit_code
 _LONGEST_REASON = 500
+_LOOK_S = 0.02
 
 
 class FederationEndedError(CosimError):
@@ -63,6 +66,7 @@ class HelicsLink:
             FederationEndedError: the federation ended while waiting.
         """
         try:
+            self._await_peers()
             helics.helicsFederateEnterExecutingMode(self._federate)
         except helics.HelicsException as error:
             raise FederationEndedError(f"the federation ended before it began: {error}") from error
@@ -98,7 +102,7 @@ class HelicsLink:
         while helics.helicsEndpointHasMessage(self._endpoint):
             message = helics.helicsEndpointGetMessage(self._endpoint)
             stamp_ns = seconds_to_ns(helics.helicsMessageGetTime(message))
-            messages.append((stamp_ns, helics.helicsMessageGetBytes(message)))
+            messages.append((stamp_ns, _bytes_of(message)))
         return messages
 
     def fail(self, reason: str) -> None:
@@ -118,6 +122,17 @@ class HelicsLink:
     def leave(self) -> None:
         """Leave a federation that has reached its end."""
         helics.helicsFederateDisconnect(self._federate)
+
+    def _await_peers(self) -> None:
+        # A federate that enters while the other is still registering leaves both waiting for ever
+        # (inproc: one start in four; tcp: now and then), so each looks first whether all are there.
+        query = helics.helicsCreateQuery("root", "federates")
+        while helics.helicsCoreIsConnected(self._core):
+            joined = helics.helicsQueryExecute(query, self._federate)
+            if isinstance(joined, list) and len(joined) >= len(FEDERATES):
+                return
+            time.sleep(_LOOK_S)
+        raise FederationEndedError("the federation ended while waiting for the other federates")
 
 
 class Broker:
@@ -141,6 +156,13 @@ class Broker:
     def wait(self, wait_s: float) -> bool:
         """Return whether the federation is over, after waiting for that at most `wait_s`."""
         return bool(helics.helicsBrokerWaitForDisconnect(self._broker, round(wait_s * 1e3)))
+
+
+def _bytes_of(message: Any) -> bytes:
+    # helicsMessageGetBytes has a C declaration parsed for each new length, 4 ms a message.
+    size_bytes = helics.helicsMessageGetByteCount(message)
+    start = helics.helicsMessageGetBytesPointer(message)
+    return bytes(helics.capi.ffi.buffer(start, size_bytes))
 
 
 def _core_options(broker_port: int | None, connect_s: float) -> str:

@@ -1,4 +1,4 @@
-"""What every process of a run does first: die with its launcher, and hear signals at any time."""
+"""What every process of a run needs: to die with its launcher, hear signals and end with a code."""
 
 import ctypes
 import os
@@ -7,6 +7,8 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+
+from tieline.errors import TielineError
 
 LAUNCHER_VARIABLE = "TIELINE_LAUNCHER_PID"
 """Environment variable with the process that a federate must not outlive; unset: none."""
@@ -58,3 +60,30 @@ def signals_held() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def reason_of(error: BaseException) -> str:
+    """Return a failure's message, with its class where it is none of tieline's."""
+    if isinstance(error, TielineError):
+        return str(error)
+    return f"{type(error).__name__}: {error}"
+
+
+def exit_code_of(error: BaseException) -> int:
+    """Return the exit code that stands for an exception."""
+    return error.exit_code if isinstance(error, TielineError) else TielineError.exit_code
+
+
+def end_process(code: int) -> None:
+    """End this process.
+
+    After a failure it ends at once: HELICS waits for lost peers in its own clean-up.
+
+    Raises:
+        SystemExit: the code is 0.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    if code:
+        os._exit(code)
+    raise SystemExit(0)

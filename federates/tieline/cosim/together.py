@@ -1,4 +1,4 @@
-"""Both federates in one process (cores inproc, local): `python -m tieline.cosim.together RUN.json`."""
+"""Both federates in one process (inproc or local): `python -m tieline.cosim.together RUN.json`."""
 
 import os
 import sys
@@ -6,23 +6,20 @@ import threading
 import traceback
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from tieline.cosim.exchange import PEER
-from tieline.cosim.federate import (
-    Federate,
-    OpenParticipant,
+from tieline.cosim.guard import GuardedParticipant
+from tieline.cosim.interfaces import FEDERATES, GRID, NETWORK, Clock, OpenParticipant
+from tieline.cosim.local import run_local
+from tieline.cosim.process import (
+    die_with_launcher,
     end_process,
     exit_code_of,
-    federation_of,
-    read_run,
+    on_termination,
     reason_of,
 )
-from tieline.cosim.guard import GuardedParticipant
-from tieline.cosim.interfaces import FEDERATES, GRID, NETWORK, Clock
-from tieline.cosim.link import Broker
-from tieline.cosim.local import run_local
-from tieline.cosim.process import die_with_launcher, on_termination, signals_held
+from tieline.cosim.runfile import federation_of, read_run
 from tieline.cosim.status import Heartbeat, State, Status
 from tieline.errors import CosimError
 
@@ -44,8 +41,7 @@ def main(participants: Mapping[str, OpenParticipant] | None = None) -> None:
     run, folder = read_run(sys.argv)
     openers = participants or _own_participants()
     statuses = {name: Status(name, _STDOUT) for name in FEDERATES}
-    runner = _InProcess if federation_of(run)[0].core == "inproc" else _Local
-    both = runner(run, folder, statuses)
+    both = _both(run, folder, statuses)
     on_termination(lambda name: _terminate(both, name))
     with Heartbeat(statuses.values()):
         code = both.serve(openers)
@@ -123,44 +119,21 @@ class _Local:
             status.enter(state)
 
 
-class _InProcess:
-    """Both federates as HELICS federates on two threads, with a broker of the inproc core."""
+class _Both(Protocol):
+    is_done: threading.Event
 
-    def __init__(self, run: dict[str, Any], folder: Path, statuses: Mapping[str, Status]) -> None:
-        self.is_done = threading.Event()
-        self._federates = [Federate(name, run, folder, statuses[name]) for name in FEDERATES]
-        self._codes: list[int] = []
+    def serve(self, openers: Mapping[str, OpenParticipant]) -> int: ...
 
-    def serve(self, openers: Mapping[str, OpenParticipant]) -> int:
-        """Return the exit code of the run: that of the first federate that failed."""
-        with signals_held():
-            broker = Broker("inproc", None)
-        threads = [
-            threading.Thread(target=self._serve_one, args=(federate, openers[federate.name]))
-            for federate in self._federates
-        ]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        self.is_done.set()
-        broker.wait(_STOP_S)
-        return next((code for code in self._codes if code), 0)
+    def stop(self, reason: str) -> None: ...
 
-    def stop(self, reason: str) -> None:
-        """End the federation from another thread and wait until both participants are saved."""
-        for federate in self._federates:
-            federate.interrupt(reason, "own")
-        for federate in self._federates:
-            federate.save()
 
-    def _serve_one(self, federate: Federate, opener: OpenParticipant) -> None:
-        code = federate.serve(opener)
-        self._codes.append(code)
-        if code:
-            # One that failed before it joined left no word in HELICS, where the other may wait.
-            for other in self._federates:
-                other.interrupt(f"{federate.name} failed", "other")
+def _both(run: dict[str, Any], folder: Path, statuses: Mapping[str, Status]) -> _Both:
+    if federation_of(run)[0].core == "local":
+        return _Local(run, folder, statuses)
+    # Imported here so that a local run needs no HELICS at all.
+    from tieline.cosim.inproc import InProcess
+
+    return InProcess(run, folder, statuses)
 
 
 def _own_participants() -> dict[str, OpenParticipant]:
@@ -170,7 +143,7 @@ def _own_participants() -> dict[str, OpenParticipant]:
     return {GRID: open_grid, NETWORK: open_network}
 
 
-def _terminate(both: _Local | _InProcess, signal_name: str) -> None:
+def _terminate(both: _Both, signal_name: str) -> None:
     both.stop(f"terminated by {signal_name}")
     if not both.is_done.wait(_STOP_S):
         os._exit(CosimError.exit_code)

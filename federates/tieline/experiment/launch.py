@@ -32,7 +32,7 @@ COMMANDS: Mapping[str, Sequence[str]] = {
 _POLL_S = 0.1
 _SETTLE_S = 0.6
 _LINGER_S = 2.0
-_END_WITHIN_S = 9.5
+_END_WITHIN_S = 9.2
 _LEAST_GRACE_S = 1.0
 _MOST_GRACE_S = 5.0
 
@@ -121,14 +121,14 @@ class _Launch:
         self._on_progress = on_progress
         self._watch = Watch(settings)
         self._children: dict[str, Child] = {}
-        self._wall_s: dict[str, float] = {}
+        self._marks: dict[str, float] = {}
 
     def run(self, starts: Sequence[tuple[str, list[str]]], stagger_s: float) -> Outcome:
         """Return the outcome once every process has ended well."""
-        began_s = time.monotonic()
+        self._marks["start"] = time.monotonic()
         try:
             self._start(starts, stagger_s)
-            self._follow(began_s)
+            self._follow()
         except BaseException as error:
             self._end()
             self._salvage(error)
@@ -145,8 +145,7 @@ class _Launch:
             except OSError as error:
                 self._fail(Suspect(name, f"could not be started: {error}", CosimError.exit_code))
 
-    def _follow(self, began_s: float) -> None:
-        marks = {"start": began_s}
+    def _follow(self) -> None:
         before_s = time.monotonic()
         while any(child.exit_code is None for child in self._children.values()):
             self._wait()
@@ -154,13 +153,12 @@ class _Launch:
             self._watch.pass_time(now_s - before_s)
             before_s = now_s
             if self._watch.is_running():
-                marks.setdefault("run", now_s)
+                self._marks.setdefault("run", now_s)
             if self._watch.is_finished():
-                marks.setdefault("end", now_s)
+                self._marks.setdefault("end", now_s)
             self._judge()
             if self._watch.is_finished() and self._watch.silence_s > _LINGER_S:
                 break
-        self._mark_phases(marks)
         self._end()
 
     def _wait(self) -> None:
@@ -211,18 +209,14 @@ class _Launch:
     def _outcome(self) -> Outcome:
         uses = (child.use for child in self._children.values())
         return Outcome(
-            dict(self._wall_s),
+            self._phases_s(),
             self._watch.granted_ns(),
             tuple(use for use in uses if use is not None),
         )
 
-    def _mark_phases(self, marks: Mapping[str, float]) -> None:
-        ends = {"start": "run", "run": "end", "end": None}
-        now_s = time.monotonic()
-        for phase, following in ends.items():
-            if phase in marks:
-                until_s = marks.get(following, now_s) if following else now_s
-                self._wall_s[phase] = until_s - marks[phase]
+    def _phases_s(self) -> dict[str, float]:
+        instants = [*self._marks.values(), time.monotonic()]
+        return {phase: instants[i + 1] - instants[i] for i, phase in enumerate(self._marks)}
 
     def _salvage(self, error: BaseException) -> None:
         from tieline.tables import salvage

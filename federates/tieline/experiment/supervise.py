@@ -22,7 +22,7 @@ _LONGEST_LINE_BYTES = 1_000_000
 
 @dataclass(frozen=True)
 class ProcessUse:
-    """What one process cost: `cpu_s` user and system time, `peak_bytes` resident memory."""
+    """What one process cost: processor time, and its peak resident memory as last looked at."""
 
     name: str
     exit_code: int
@@ -71,6 +71,7 @@ class Child:
         self.name = name
         self.exit_code: int | None = None
         self.use: ProcessUse | None = None
+        self._peak_bytes = 0
         self._process = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
@@ -113,13 +114,14 @@ class Child:
             return True
         # Looked at before it is reaped: until then its group's number cannot be another's.
         if os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
+            self._peak_bytes = _peak_bytes(self.pid) or self._peak_bytes
             return False
         self._signal(signal.SIGKILL)
         _, status, usage = os.wait4(self.pid, 0)
         self.exit_code = os.waitstatus_to_exitcode(status)
         self._process.returncode = self.exit_code
         cpu_s = usage.ru_utime + usage.ru_stime
-        self.use = ProcessUse(self.name, self.exit_code, cpu_s, usage.ru_maxrss * 1024)
+        self.use = ProcessUse(self.name, self.exit_code, cpu_s, self._peak_bytes)
         return True
 
     def is_stopped(self) -> bool:
@@ -207,6 +209,21 @@ def _environment() -> dict[str, str]:
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         environment.setdefault(variable, "1")
     return environment
+
+
+def _peak_bytes(pid: int) -> int:
+    """Return the peak resident memory of a living process, 0 where the kernel does not tell.
+
+    Not what wait4 says: that begins with the memory of the launcher, whose fork the child was.
+    """
+    try:
+        status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return 0
+    for line in status.splitlines():
+        if line.startswith("VmHWM:"):
+            return int(line.split()[1]) * 1024
+    return 0
 
 
 def _read(descriptor: int) -> bytes | None:

@@ -1,0 +1,34 @@
+"""Reads a run file for the process that was started with it."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from tieline.cosim.interfaces import FederationSettings
+from tieline.errors import InputError
+
+
+def read_run(argv: list[str]) -> tuple[dict[str, Any], Path]:
+    """Return the run file's content and its folder.
+
+    Raises:
+        SystemExit: there is no such argument or file, or it is no JSON.
+    """
+    try:
+        if len(argv) != 2:
+            raise InputError(
+                f"usage: {Path(argv[0]).name} RUN.json (got {len(argv) - 1} arguments)"
+            )
+        path = Path(argv[1])
+        return json.loads(path.read_text(encoding="utf-8")), path.resolve().parent
+    except (InputError, OSError, json.JSONDecodeError) as error:
+        sys.stderr.write(f"cannot read the run file: {error}\n")
+        raise SystemExit(InputError.exit_code) from error
+
+
+def federation_of(run: dict[str, Any]) -> tuple[FederationSettings, int | None]:
+    """Return a run's federation settings and its broker's port."""
+    stated = dict(run["federation"])
+    port = stated.pop("broker_port", None)
+    return FederationSettings(**stated), port
