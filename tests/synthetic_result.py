@@ -82,6 +82,13 @@ def write_grid(folder: Path, duration_s: float = 41.0, delay_s: float = 0.0) -> 
         Column(name, name.split(".")[0].rsplit("_")[-1], f"synthetic {name}") for name in data
     ]
     write_table(folder / "grid.parquet", columns, data)
+    log = {"t_s": [1.0], "what": np.array(["G26 trips"], dtype=object), "is_ending": [0]}
+    columns = [
+        Column("t_s", "s", "instant"),
+        Column("what", "", "event", "str"),
+        Column("is_ending", "", "1 if the run ended with it", "int64"),
+    ]
+    write_table(folder / "events.parquet", columns, {k: np.asarray(v) for k, v in log.items()})
 
 
 def write_network(folder: Path, mean_s: float = 0.25) -> None:

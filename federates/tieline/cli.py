@@ -1,4 +1,4 @@
-"""The command line: `tieline run`, `list`, `validate` and `report`."""
+"""The command line: `tieline run`, `list`, `validate`, `report` and `models`."""
 
 import traceback
 from collections.abc import Iterator
@@ -117,6 +117,23 @@ def report(
 
     with reporting(debug):
         write_report(folder, Console())
+
+
+@app.command()
+def models(
+    role: Annotated[
+        str | None, typer.Argument(help="machine, exciter, governor or pss; all without it")
+    ] = None,
+    debug: Debug = False,
+) -> None:
+    """List the device models: source, states, and each parameter with unit, bounds and meaning."""
+    from tieline.grid.models.base import ROLES
+    from tieline.grid.models.catalogue import as_text, entries
+
+    with reporting(debug):
+        if role is not None and role not in ROLES:
+            raise InputError(f"no role '{role}': give one of {', '.join(ROLES)}")
+        say("\n\n".join(as_text(entry) for entry in entries(role)))
 
 
 def planned(reference: str, settings: list[str]) -> "Plan":

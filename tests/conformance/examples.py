@@ -16,7 +16,7 @@ def parameters(model: type[Model], n: int) -> np.ndarray:
     Numbers on which limits or equalities rest stay as they are.
     """
     example = model.example
-    fixed = {"xq_pp", "xd_pp", "beta1", "beta2"}
+    fixed = {"xq_pp", "xd_pp", "beta1", "beta2", "M", "N"}
     factors = 1.0 + 0.01 * np.arange(n)
     return np.array(
         [
@@ -37,7 +37,9 @@ def signals(n: int) -> dict[str, np.ndarray]:
         named[name] = np.ones(n)
     named["w_s"] = np.full(n, 120.0 * np.pi)
     named["Efd"] = 2.1 + 0.01 * spread
+    named["Ifd"] = 2.1 + 0.01 * spread
     named["Pm"] = 0.8 - 0.01 * spread
+    named["Pe"] = (v * np.conj(i)).real
     return named
 
 

@@ -25,7 +25,7 @@ def test_the_run_file_holds_all_that_a_federate_needs(tmp_path: Path) -> None:
         {"name": "pmu02", "bus": 119},
     ]
     assert run["destinations"][1] == {"name": "ctl01", "unit": "G34", "bus": 118}
-    assert run["grid"]["events"] == [{"at": 1.0, "trip_generator": "G26"}]
+    assert run["grid"]["events"] == [{"at": 1.0, "when": None, "trip_generator": "G26"}]
     assert run["network"]["topology"] is None
     assert run["tie_mode"] == SITES.tie_mode
     assert run["frequency_hz"] == 60.0

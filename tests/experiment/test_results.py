@@ -95,3 +95,4 @@ def test_a_missing_table_has_no_rows(tmp_path: Path) -> None:
     assert run.table("packets").empty
     assert run.tripped_units() == {"G26"}
     assert run.events() == [(1.0, "G26 trips")]
+    assert run.ending() is None

@@ -5,7 +5,16 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tieline.grid.models.blocks import clamp, lag, lag_non_windup, lead_lag, washout
+from tieline.grid.models.blocks import (
+    clamp,
+    lag,
+    lag_non_windup,
+    lead_lag,
+    limited_integrator,
+    limited_lag,
+    rate_feedback,
+    washout,
+)
 
 one = np.array([1.0])
 
@@ -38,6 +47,9 @@ def scalar(block: Callable, *parameters: float) -> Callable:
         (lead_lag, (-1.0, 0.5), lambda s: (1 - s) / (1 + 0.5 * s)),
         (lag, (0.5,), lambda s: 1 / (1 + 0.5 * s)),
         (lag_non_windup, (200.0, 0.02, -1e9, 1e9), lambda s: 200 / (1 + 0.02 * s)),
+        (limited_lag, (200.0, 0.02, -1e9, 1e9), lambda s: 200 / (1 + 0.02 * s)),
+        (limited_integrator, (-1e9, 1e9), lambda s: 1 / s),
+        (rate_feedback, (0.1, 0.675), lambda s: 0.1 * s / (1 + 0.675 * s)),
     ],
 )
 def test_a_block_has_the_transfer_function_of_its_name(
@@ -48,9 +60,19 @@ def test_a_block_has_the_transfer_function_of_its_name(
 
 
 @pytest.mark.parametrize(("u", "x", "stops"), [(1.0, 5.0, True), (-1.0, 5.0, False)])
-def test_a_non_windup_limit_holds_and_releases_at_once(u: float, x: float, stops: bool) -> None:
+@pytest.mark.parametrize(
+    ("block", "parameters"),
+    [
+        (lag_non_windup, (200.0, 0.02, -5.0, 5.0)),
+        (limited_lag, (200.0, 0.02, -5.0, 5.0)),
+        (limited_integrator, (-5.0, 5.0)),
+    ],
+)
+def test_a_non_windup_limit_holds_and_releases_at_once(
+    block: Callable, parameters: tuple[float, ...], u: float, x: float, stops: bool
+) -> None:
     """A state that wound up behind its limit would keep the field forced for seconds too long."""
-    call = scalar(lag_non_windup, 200.0, 0.02, -5.0, 5.0)
+    call = scalar(block, *parameters)
     assert (call(u, x)[1] == 0.0) is stops
     assert (call(-u, -x)[1] == 0.0) is stops
 
@@ -59,3 +81,22 @@ def test_a_clamp_keeps_what_lies_between_its_limits() -> None:
     """A limit that moved what it allows would be a gain."""
     got = clamp(np.array([-2.0, 0.3, 2.0]), -one, one)
     np.testing.assert_array_equal(got, [-1.0, 0.3, 1.0])
+
+
+def test_a_state_that_a_moving_limit_left_behind_follows_it() -> None:
+    """A ceiling that falls with the voltage must not leave a store of field above it."""
+    # K u = 8 drives against the limit, which has fallen from 5 to 3.
+    y, dx = scalar(limited_lag, 200.0, 0.02, -5.0, 3.0)(0.04, 5.0)
+    assert y == 3.0
+    assert dx == pytest.approx((3.0 - 5.0) / 0.02, rel=1e-15)
+
+
+@pytest.mark.parametrize(("u", "y"), [(0.01, 2.0), (0.04, 5.0), (-0.04, -5.0)])
+def test_a_limited_lag_without_time_constant_is_a_limited_gain(u: float, y: float) -> None:
+    """T_A = 0 stands in half of the published data."""
+    assert scalar(limited_lag, 200.0, 0.0, -5.0, 5.0)(u, 1.0) == (y, 0.0)
+
+
+def test_a_rate_feedback_without_time_constant_is_none() -> None:
+    """K_F = T_F = 0 means that there is no stabilising feedback."""
+    assert scalar(rate_feedback, 0.0, 0.0)(3.0, 1.0) == (0.0, 0.0)

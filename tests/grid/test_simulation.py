@@ -5,14 +5,14 @@ import pytest
 
 from tieline.errors import NumericalError
 from tieline.grid.case import Case
-from tieline.grid.events import Switching, plan_events
+from tieline.grid.events import Disturbance, plan_events
 from tieline.grid.powerflow import PowerFlow
 from tieline.grid.settings import GridSettings
 from tieline.grid.simulation import Grid
 from tieline.grid.system import System, build_system, rotor_average, sensor_average
 
 
-def trip(case: Case, at: float = 0.0, rate: int = 240) -> list[Switching]:
+def trip(case: Case, at: float = 0.0, rate: int = 240) -> list[Disturbance]:
     """The trip of G26, on a grid of `rate` steps a second."""
     events = [{"at": at, "trip_generator": "G26"}]
     settings = GridSettings(duration=10.0, steps_per_second=rate, events=events)

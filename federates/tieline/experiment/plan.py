@@ -67,16 +67,18 @@ def prepare(study: Study, survey: Survey = survey) -> Plan:
 
 
 def _planned(study: Study, point: Point, survey: Survey, known: dict[str, Sites]) -> PlannedRun:
-    experiment = point.experiment
-    folder = _case_folder(experiment.case, study.sources.document.path.parent)
-    topology = _topology(experiment, folder, study.sources.document.path.parent)
+    beside = study.sources.document.path.parent
+    experiment = _with_pss_file(point.experiment, beside)
+    folder = _case_folder(experiment.case, beside)
+    topology = _topology(experiment, folder, beside)
     parts = experiment.model_dump(mode="json", include={"grid", "wams", "network"})
     key = canonical_json([str(folder), parts])
     if key not in known:
         known[key] = survey(experiment, folder, topology)
     sites = known[key]
     weights = experiment.wams.weights
-    if weights != "equal" and len(weights) != len(sites.sensors):
+    of_rotors = experiment.grid.pss.average == "rotors"
+    if not isinstance(weights, str) and not of_rotors and len(weights) != len(sites.sensors):
         raise InputError(
             f"wams.weights must have one weight for each of the {len(sites.sensors)} sensors"
             f" (got {len(weights)})"
@@ -84,7 +86,10 @@ def _planned(study: Study, point: Point, survey: Survey, known: dict[str, Sites]
     inputs = {"case": _folder_hash(folder)}
     if topology is not None:
         inputs["topology"] = hashlib.sha256(topology.read_bytes()).hexdigest()
-    return PlannedRun(point, _run_file(point, sites, folder, topology), inputs)
+    if experiment.grid.pss.file is not None:
+        inputs["pss"] = hashlib.sha256(Path(experiment.grid.pss.file).read_bytes()).hexdigest()
+    run = _run_file(point, sites, folder, topology) | {"grid": parts["grid"]}
+    return PlannedRun(point, run, inputs)
 
 
 def _run_file(point: Point, sites: Sites, folder: Path, topology: Path | None) -> dict[str, Any]:
@@ -107,6 +112,23 @@ def _run_file(point: Point, sites: Sites, folder: Path, topology: Path | None) -
         "tie_mode": sites.tie_mode,
         "plot_unit": sites.plot_unit,
     }
+
+
+def _with_pss_file(experiment: Experiment, beside: Path) -> Experiment:
+    """Return the experiment with its file of stabilisers as an absolute path.
+
+    Raises:
+        InputError: there is no such file beside the experiment's file or here.
+    """
+    name = experiment.grid.pss.file
+    if name is None:
+        return experiment
+    for path in (beside / name, Path(name)):
+        if path.is_file():
+            pss = experiment.grid.pss.model_copy(update={"file": str(path.resolve())})
+            grid = experiment.grid.model_copy(update={"pss": pss})
+            return experiment.model_copy(update={"grid": grid})
+    raise InputError(f"grid.pss.file {name!r} is missing: no file {beside / name}")
 
 
 def _case_folder(name: str, beside: Path) -> Path:

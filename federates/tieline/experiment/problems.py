@@ -129,6 +129,7 @@ _KINDS = {
     "string": "text",
     "bool": "true or false",
     "list": "a list",
+    "tuple": "a list",
     "model": "a group of keys",
     "dict": "a group of keys",
     "finite": "a finite number",

@@ -58,13 +58,18 @@ class Run:
 
     def events(self) -> list[tuple[float, str]]:
         """Return (instant in s, what happens) of each event, in order of time."""
-        words = {"trip_generator": "{} trips", "trip_branch": "{} opens"}
-        return sorted(
-            (float(event["at"]), text.format(event[kind]))
-            for event in self.config["grid"]["events"]
-            for kind, text in words.items()
-            if kind in event
-        )
+        log = self.table("events")
+        if log.empty:
+            return []
+        return [(float(t_s), str(what)) for t_s, what in zip(log["t_s"], log["what"], strict=True)]
+
+    def ending(self) -> str | None:
+        """Return why the run was over before its time, as a result; None if it was not."""
+        log = self.table("events")
+        if log.empty or not log["is_ending"].any():
+            return None
+        row = log[log["is_ending"] == 1].iloc[0]
+        return f"{row['what']} at {row['t_s']:.3f} s"
 
     def tripped_units(self) -> set[str]:
         """Return the units that an event trips; they go on alone and count in no average."""

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictInt
 
 from tieline.cosim.interfaces import FederationSettings
 from tieline.experiment.problems import Path, Problem
-from tieline.grid.settings import GridSettings, TripGenerator
+from tieline.grid.settings import GridSettings
 from tieline.network.settings import NetworkSettings
 from tieline.wams.settings import WamsSettings
 
@@ -49,7 +49,8 @@ FIXED: frozenset[str] = frozenset({"name", "question", "sweep"})
 
 def contradictions(experiment: Experiment) -> list[Problem]:
     """Return what does not fit together in an experiment whose single values are right."""
-    return [*_timing(experiment), *_events(experiment), *_average(experiment), *_engine(experiment)]
+    parts = (_timing, _average, _engine, _delay_line)
+    return [problem for part in parts for problem in part(experiment)]
 
 
 def without_effect(experiment: Experiment) -> list[Problem]:
@@ -96,46 +97,18 @@ def _timing(experiment: Experiment) -> Iterator[Problem]:
         )
 
 
-def _events(experiment: Experiment) -> Iterator[Problem]:
-    grid = experiment.grid
-    seen: set[tuple[str, str]] = set()
-    for i, event in enumerate(grid.events):
-        at = ("grid", "events", i, "at")
-        is_unit = isinstance(event, TripGenerator)
-        kind = "trip_generator" if is_unit else "trip_branch"
-        target: str = getattr(event, kind)
-        if event.at >= grid.duration:
-            yield Problem(
-                (at, ("grid", "duration")),
-                f"grid.events[{i}].at must lie before the end of the run at {grid.duration:g} s"
-                f" (got {event.at:g} s)",
-            )
-        steps = event.at * grid.steps_per_second
-        if not _is_whole(steps):
-            yield Problem(
-                (at, ("grid", "steps_per_second")),
-                f"grid.events[{i}].at must fall on an integration step of"
-                f" 1/{grid.steps_per_second} s (got {event.at:g} s;"
-                f" {round(steps) / grid.steps_per_second:.6g} s would do)",
-            )
-        if (kind, target) in seen:
-            yield Problem(
-                (("grid", "events", i, kind),), f"grid.events[{i}]: '{target}' is tripped twice"
-            )
-        seen.add((kind, target))
-
-
 def _average(experiment: Experiment) -> Iterator[Problem]:
     wams = experiment.wams
     units = experiment.grid.pss.units
     yield from _repeated(("grid", "pss", "units"), [] if units == "all" else list(units))
     if wams.sensors != "default":
         yield from _repeated(("wams", "sensors"), list(wams.sensors))
-    if wams.weights == "equal":
+    if isinstance(wams.weights, str):
         return
     if not any(wams.weights):
         yield Problem((("wams", "weights"),), "wams.weights must not all be 0")
-    if wams.sensors != "default" and len(wams.weights) != len(wams.sensors):
+    of_rotors = experiment.grid.pss.average == "rotors"
+    if not of_rotors and wams.sensors != "default" and len(wams.weights) != len(wams.sensors):
         yield Problem(
             (("wams", "weights"), ("wams", "sensors")),
             f"wams.weights must have one weight for each of the {len(wams.sensors)} sensors"
@@ -156,6 +129,28 @@ def _engine(experiment: Experiment) -> Iterator[Problem]:
             (("network", "engine"), ("network", "delay")),
             "network.engine constant needs network.delay, such as 250 ms (got none)",
         )
+
+
+def _delay_line(experiment: Experiment) -> Iterator[Problem]:
+    """Yield why the grid's own delay line cannot hold the delay of a continuous average.
+
+    It holds the average at whole steps. The middle stages of rk4 fall between two of them and are
+    read off a cubic that reaches one step ahead, which after a delay of one step is not yet known.
+    """
+    delay, grid = experiment.network.delay, experiment.grid
+    if experiment.wams.reporting != "continuous" or delay is None:
+        return
+    rate, least = grid.steps_per_second, 2 if grid.method == "rk4" else 1
+    steps = delay * rate
+    if _is_whole(steps) and (round(steps) == 0 or round(steps) >= least):
+        return
+    at_least = " and at least two" if least == 2 else ""
+    yield Problem(
+        (("network", "delay"), ("grid", "steps_per_second"), ("grid", "method")),
+        f"network.delay must be 0 or a whole number{at_least} of integration steps of 1/{rate} s"
+        f" with wams.reporting continuous and grid.method {grid.method}"
+        f" (got {delay:g} s; {max(least, round(steps)) / rate:.9g} s would do)",
+    )
 
 
 def _repeated(path: Path, values: list[object]) -> Iterator[Problem]:

@@ -63,8 +63,10 @@ def survey(experiment: Experiment, folder: Path, topology: Path | None) -> Sites
     """
     # The case brings the compiled models with it, which `tieline list` should not wait for.
     from tieline.grid.case import load_case
+    from tieline.grid.models.registry import use_file
     from tieline.network.topology import check_topology
 
+    use_file("pss", experiment.grid.pss.file)
     case = load_case(folder)
     sensors, controllers, findings = _stations(case, experiment)
     tie_mode = case.base.tie_mode

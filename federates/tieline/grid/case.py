@@ -1,30 +1,26 @@
 """A case: the tables of one interconnection, read from its folder and checked whole."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from tieline import yaml_lines
-from tieline.grid.models.base import Model
-from tieline.grid.models.registry import models
-from tieline.grid.tables import Findings, Row, near, read_rows, unique
+from tieline.grid.case_file import CaseFile, check_case_file, read_case_file
+from tieline.grid.device_tables import (
+    DEVICE_TABLES,
+    Device,
+    check_controls,
+    parse_devices,
+    read_device_table,
+)
+from tieline.grid.tables import Findings, Row, Table, read_table
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 KINDS = ("slack", "pv", "pq")
-DEVICE_TABLES = {
-    "machine": "machine.csv",
-    "exciter": "exciter.csv",
-    "governor": "governor.csv",
-    "pss": "pss.csv",
-}
 
 _BUS_NUMBERS = (
     "base_kV", "v_pu", "theta_deg", "p_gen_pu", "p_load_pu", "q_load_pu",
@@ -34,31 +30,7 @@ _BRANCH_NUMBERS = (
     "resistance_pu", "reactance_pu", "susceptance_pu", "tap_ratio", "phase_shift_deg",
 )  # fmt: skip
 _LOAD_SHARES = ("p_constant_power", "p_constant_current", "q_constant_power", "q_constant_current")
-
-
-class TieMode(BaseModel):
-    """Two groups of units whose swing against each other a summary reports."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    units: tuple[str, ...] = Field(min_length=1)
-    against: tuple[str, ...] = Field(min_length=1)
-    band_Hz: tuple[float, float]
-
-
-class CaseFile(BaseModel):
-    """What case.yaml says."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    name: str
-    title: str
-    base_MVA: float = Field(gt=0)
-    frequency_Hz: Literal[50, 60]
-    areas: tuple[str, ...]
-    sensors: tuple[int, ...] = Field(min_length=1)
-    tie_mode: TieMode | None = None
-    plot_unit: str | None = None
+_NO_BUS = -1
 
 
 @dataclass(frozen=True)
@@ -105,16 +77,6 @@ class Loads:
 
 
 @dataclass(frozen=True)
-class Device:
-    """One unit's device: its model and its parameters by symbol, on the machine base."""
-
-    unit: str
-    model: type[Model]
-    values: Mapping[str, float]
-    where: str
-
-
-@dataclass(frozen=True)
 class Case:
     """An interconnection.
 
@@ -157,63 +119,92 @@ def load_case(folder: Path) -> Case:
             lists every finding with file and line.
     """
     findings = Findings()
-    base = _case_file(folder / "case.yaml", findings)
-    buses, index = _buses(folder, findings)
-    branches = _branches(folder, index, findings)
-    loads = _loads(folder, index, buses, findings)
-    machine_rows = _machine_rows(folder, index, findings)
-    units = tuple(row.cells["unit"] for row in machine_rows)
-    devices = {role: _devices(folder, role, units, findings) for role in DEVICE_TABLES}
-    _check_references(base, buses, units, devices, findings)
+    file = read_case_file(folder, findings)
+    tables = _read_tables(folder, findings)
+    machines = tables["machine"]
+    buses, places = _buses(tables["bus"], file.content.areas if file else None, findings)
+    branches = _branches(tables["branch"], places, findings)
+    loads = _loads(tables["load"], buses, places, findings)
+    units, unit_bus, unit_MVA = _units(machines, places, findings)
+    known_units = list(units) if machines.is_whole and units else None
+    devices = {
+        role: parse_devices(tables[role], role, known_units, findings)
+        for role in tables
+        if role in DEVICE_TABLES
+    }
+    _check_generation(tables["bus"], buses, unit_bus, machines, findings)
+    check_controls(devices, findings)
+    _check_excited(tables["pss"], tables["exciter"], findings)
+    if file is not None:
+        known_buses = list(places.rows) if places.is_whole else None
+        check_case_file(file, known_buses, known_units, findings)
     findings.stop()
-    assert base is not None
-    return Case(
-        folder=folder,
-        base=base,
-        buses=buses,
-        branches=branches,
-        loads=loads,
-        units=units,
-        unit_bus=np.array([index[findings.whole(row, "bus")] for row in machine_rows], np.int64),
-        unit_MVA=np.array([findings.number(row, "base_MVA") for row in machine_rows]),
-        devices=devices,
-    )
+    assert file is not None
+    return Case(folder, file.content, buses, branches, loads, units, unit_bus, unit_MVA, devices)
 
 
-def _case_file(path: Path, findings: Findings) -> CaseFile | None:
-    document = yaml_lines.load(path)
-    try:
-        return CaseFile.model_validate(document.data)
-    except ValidationError as error:
-        for item in error.errors():
-            where = f"{path.name}:{document.line(item['loc'])}"
-            key = ".".join(str(part) for part in item["loc"])
-            hint = near(str(item["loc"][-1]), list(CaseFile.model_fields)) if item["loc"] else ""
-            findings.add(where, f"'{key}': {item['msg']} (got {item['input']!r}{hint})")
-    return None
+@dataclass(frozen=True)
+class _Places:
+    """The row of each bus by its number; `is_whole` is False where a row of bus.csv was lost."""
+
+    rows: Mapping[int, int]
+    is_whole: bool
+
+    def find(self, row: Row, column: str, findings: Findings) -> int:
+        """Return the bus's row, or `_NO_BUS` and a finding."""
+        number = findings.whole(row, column)
+        if number is not None and self.is_whole:
+            findings.known(row.where, "bus", number, list(self.rows))
+        return _NO_BUS if number is None else self.rows.get(number, _NO_BUS)
+
+
+def _read_tables(folder: Path, findings: Findings) -> dict[str, Table]:
+    def read(
+        name: str, required: Sequence[str], optional: Sequence[str] = (), must_exist: bool = True
+    ) -> Table:
+        return read_table(folder / name, required, optional, findings, must_exist=must_exist)
+
+    ends = ("from_bus", "to_bus", "circuit", "kind")
+    return {
+        "bus": read("bus.csv", ("bus", "kind", "area", *_BUS_NUMBERS), ("area_origin",)),
+        "branch": read("branch.csv", (*ends, *_BRANCH_NUMBERS)),
+        "load": read("load.csv", ("bus", *_LOAD_SHARES), ("kind", "note"), must_exist=False),
+        **{role: read_device_table(folder, role, findings) for role in DEVICE_TABLES},
+    }
 
 
 def _column(rows: Sequence[Row], name: str, findings: Findings) -> Floats:
     return np.array([findings.number(row, name) for row in rows], np.float64)
 
 
-def _buses(folder: Path, findings: Findings) -> tuple[Buses, dict[int, int]]:
-    required = ("bus", "kind", "area", *_BUS_NUMBERS)
-    rows = read_rows(folder / "bus.csv", required, ("area_origin",), findings)
-    findings.stop()
-    unique(rows, lambda row: row.cells["bus"], "bus", findings)
-    values = {name: _column(rows, name, findings) for name in _BUS_NUMBERS}
-    kinds = tuple(findings.word(row, "kind", KINDS) for row in rows)
-    if kinds.count("slack") != 1:
-        findings.add("bus.csv", f"needs exactly one slack bus (has {kinds.count('slack')})")
-    for row, v, base in zip(rows, values["v_pu"], values["base_kV"], strict=True):
-        if v <= 0 or base <= 0:
-            findings.add(row.where, f"v_pu and base_kV must be > 0 (got {v:g} and {base:g})")
+def _text(rows: Sequence[Row], name: str) -> tuple[str, ...]:
+    return tuple(row.cells[name] for row in rows)
+
+
+def _buses(table: Table, areas: Sequence[str] | None, findings: Findings) -> tuple[Buses, _Places]:
+    rows = table.rows
     numbers = [findings.whole(row, "bus") for row in rows]
+    findings.unique(rows, numbers, "bus")
+    values = {name: _column(rows, name, findings) for name in _BUS_NUMBERS}
+    kinds = [findings.word(row, "kind", KINDS) for row in rows]
+    for at, row in enumerate(rows):
+        for name in ("v_pu", "base_kV"):
+            if values[name][at] <= 0:
+                findings.add(row.where, f"'{name}' must be > 0 (got {row.cells[name]})")
+        if values["q_gen_max_pu"][at] < values["q_gen_min_pu"][at]:
+            findings.add(
+                row.where,
+                "'q_gen_max_pu' must be >= 'q_gen_min_pu', equal for no limits "
+                f"(got {row.cells['q_gen_max_pu']} and {row.cells['q_gen_min_pu']})",
+            )
+        if areas is not None:
+            findings.known(row.where, "area", row.cells["area"], areas)
+    if table.is_whole and None not in kinds:
+        _check_slack(rows, kinds, findings)
     buses = Buses(
-        number=np.array(numbers, np.int64),
+        number=np.array([number or 0 for number in numbers], np.int64),
         base_kV=values["base_kV"],
-        kind=kinds,
+        kind=tuple(kind or "pq" for kind in kinds),
         v=values["v_pu"],
         theta=np.deg2rad(values["theta_deg"]),
         p_gen=values["p_gen_pu"],
@@ -223,147 +214,125 @@ def _buses(folder: Path, findings: Findings) -> tuple[Buses, dict[int, int]]:
         b_shunt=values["b_shunt_pu"],
         q_gen_max=values["q_gen_max_pu"],
         q_gen_min=values["q_gen_min_pu"],
-        area=tuple(row.cells["area"] for row in rows),
+        area=_text(rows, "area"),
     )
-    return buses, {number: position for position, number in enumerate(numbers)}
+    places = {number: at for at, number in enumerate(numbers) if number is not None}
+    return buses, _Places(places, table.is_whole and None not in numbers)
 
 
-def _bus_of(row: Row, column: str, index: Mapping[int, int], findings: Findings) -> int:
-    number = findings.whole(row, column)
-    findings.known(row.where, "bus", number, list(index))
-    return index.get(number, 0)
+def _check_slack(rows: Sequence[Row], kinds: Sequence[str | None], findings: Findings) -> None:
+    slack = [row for row, kind in zip(rows, kinds, strict=True) if kind == "slack"]
+    if not slack:
+        findings.add("bus.csv:1", "needs one bus of kind slack (has none)")
+    for row in slack[1:]:
+        findings.add(
+            row.where, f"bus {row.cells['bus']} is a second slack bus, after {slack[0].where}"
+        )
 
 
-def _branches(folder: Path, index: Mapping[int, int], findings: Findings) -> Branches:
-    required = ("from_bus", "to_bus", "circuit", "kind", *_BRANCH_NUMBERS)
-    rows = read_rows(folder / "branch.csv", required, (), findings)
-    findings.stop()
-    names = []
+def _branch_names(rows: Sequence[Row], findings: Findings) -> tuple[str, ...]:
+    names, keys = [], []
     for row in rows:
-        ends = f"{row.cells['from_bus']}-{row.cells['to_bus']}"
+        start, end = row.cells["from_bus"], row.cells["to_bus"]
         circuit = findings.whole(row, "circuit")
-        names.append(ends if circuit == 1 else f"{ends}#{circuit}")
-    unique(rows, lambda row: names[rows.index(row)], "branch", findings)
+        names.append(branch_name(start, end, circuit or 1))
+        keys.append(branch_name(min(start, end), max(start, end), circuit) if circuit else None)
+        if start == end:
+            findings.add(row.where, f"from_bus and to_bus must differ (got {start} twice)")
+    findings.unique(rows, keys, "branch")
+    return tuple(names)
+
+
+def _branches(table: Table, places: _Places, findings: Findings) -> Branches:
+    rows = table.rows
+    names = _branch_names(rows, findings)
+    start, end = (
+        np.array([places.find(row, column, findings) for row in rows], np.int64)
+        for column in ("from_bus", "to_bus")
+    )
     values = {name: _column(rows, name, findings) for name in _BRANCH_NUMBERS}
     impedance = values["resistance_pu"] + 1j * values["reactance_pu"]
     for row, z, tap in zip(rows, impedance, values["tap_ratio"], strict=True):
         if z == 0:
             findings.add(row.where, "resistance_pu and reactance_pu must not both be 0")
         if tap <= 0:
-            findings.add(row.where, f"tap_ratio must be > 0, 1 without a tap (got {tap:g})")
+            findings.add(
+                row.where,
+                f"'tap_ratio' must be > 0, 1 without a tap (got {row.cells['tap_ratio']})",
+            )
+    ratio = values["tap_ratio"] * np.exp(1j * np.deg2rad(values["phase_shift_deg"]))
     return Branches(
-        name=tuple(names),
-        start=np.array([_bus_of(row, "from_bus", index, findings) for row in rows], np.int64),
-        end=np.array([_bus_of(row, "to_bus", index, findings) for row in rows], np.int64),
+        name=names,
+        start=start,
+        end=end,
         impedance=impedance,
         susceptance=values["susceptance_pu"],
-        tap=np.asarray(
-            values["tap_ratio"] * np.exp(1j * np.deg2rad(values["phase_shift_deg"])), np.complex128
-        ),
-        kind=tuple(row.cells["kind"] for row in rows),
+        tap=np.asarray(ratio, np.complex128),
+        kind=_text(rows, "kind"),
     )
 
 
-def _loads(folder: Path, index: Mapping[int, int], buses: Buses, findings: Findings) -> Loads:
-    rows = read_rows(
-        folder / "load.csv", ("bus", *_LOAD_SHARES), ("kind", "note"), findings, must_exist=False
-    )
-    findings.stop()
-    unique(rows, lambda row: row.cells["bus"], "load of bus", findings)
+def branch_name(start: str, end: str, circuit: int) -> str:
+    """Return a branch's name: FROM-TO, with #N for the Nth parallel circuit from the second."""
+    return f"{start}-{end}" if circuit == 1 else f"{start}-{end}#{circuit}"
+
+
+def _loads(table: Table, buses: Buses, places: _Places, findings: Findings) -> Loads:
+    rows = table.rows
     shares = {name: _column(rows, name, findings) for name in _LOAD_SHARES}
-    bus = np.array([_bus_of(row, "bus", index, findings) for row in rows], np.int64)
-    for position, row in enumerate(rows):
+    bus = np.array([places.find(row, "bus", findings) for row in rows], np.int64)
+    findings.unique(rows, _text(rows, "bus"), "load of bus")
+    for at, row in enumerate(rows):
         for letter in "pq":
-            parts = [shares[f"{letter}_constant_{what}"][position] for what in ("power", "current")]
-            if min(parts) < 0 or math.fsum(parts) > 1:
+            parts = [float(shares[f"{letter}_constant_{of}"][at]) for of in ("power", "current")]
+            if min(parts) < 0 or sum(parts) > 1:
                 findings.add(
-                    row.where, f"shares of {letter} must be >= 0 and sum to <= 1 (got {parts})"
+                    row.where,
+                    f"shares of {letter} must be >= 0 and sum to <= 1 "
+                    f"(got {parts[0]:g} and {parts[1]:g})",
                 )
-        if buses.p_load[bus[position]] == 0 == buses.q_load[bus[position]]:
+        if bus[at] != _NO_BUS and buses.p_load[bus[at]] == 0 == buses.q_load[bus[at]]:
             findings.add(row.where, f"bus {row.cells['bus']} has no load in bus.csv")
     return Loads(bus, **shares)
 
 
-def _machine_rows(folder: Path, index: Mapping[int, int], findings: Findings) -> list[Row]:
-    rows = _device_rows(folder, "machine", findings)
-    unique(rows, lambda row: row.cells["unit"], "unit", findings)
-    for row in rows:
-        _bus_of(row, "bus", index, findings)
-        if findings.number(row, "base_MVA") <= 0:
-            findings.add(row.where, f"base_MVA must be > 0 (got {row.cells['base_MVA']})")
-    if not rows:
-        findings.add("machine.csv", "has no machine")
-    findings.stop()
-    return rows
+def _units(
+    table: Table, places: _Places, findings: Findings
+) -> tuple[tuple[str, ...], Integers, Floats]:
+    """Return names, bus indices and ratings, MVA, of the units."""
+    rows, units = table.rows, _text(table.rows, "unit")
+    if table.is_whole and not rows:
+        findings.add("machine.csv:1", "has no machine: a case needs one at its slack bus")
+    unit_bus = np.array([places.find(row, "bus", findings) for row in rows], np.int64)
+    unit_MVA = _column(rows, "base_MVA", findings)
+    for row, name, rating in zip(rows, units, unit_MVA, strict=True):
+        if not name:
+            findings.add(row.where, "'unit' must not be empty")
+        if rating <= 0:
+            findings.add(row.where, f"'base_MVA' must be > 0 (got {row.cells['base_MVA']})")
+    return units, unit_bus, unit_MVA
 
 
-def _device_rows(folder: Path, role: str, findings: Findings) -> list[Row]:
-    required = ["unit", "model"] + (["bus", "base_MVA"] if role == "machine" else [])
-    optional = sorted({p.column for model in models(role).values() for p in model.parameters})
-    path = folder / DEVICE_TABLES[role]
-    remarks = ["technology", "kind"]
-    return read_rows(path, required, optional + remarks, findings, must_exist=role == "machine")
-
-
-def _devices(
-    folder: Path, role: str, units: Sequence[str], findings: Findings
-) -> tuple[Device, ...]:
-    rows = _device_rows(folder, role, Findings() if role == "machine" else findings)
-    unique(rows, lambda row: row.cells["unit"], role, findings)
-    devices = []
-    for row in rows:
-        unit = row.cells["unit"]
-        findings.known(row.where, "unit", unit, units)
-        model = models(role)[findings.word(row, "model", list(models(role)))]
-        devices.append(Device(unit, model, _values(row, unit, model, findings), row.where))
-    return tuple(devices)
-
-
-def _values(row: Row, unit: str, model: type[Model], findings: Findings) -> dict[str, float]:
-    values: dict[str, float] = {}
-    missing = [p.column for p in model.parameters if p.column not in row.cells]
-    if missing:
-        findings.add(row.where, f"{model.key} needs the columns {', '.join(missing)}")
-        return values
-    complete = True
-    for parameter in model.parameters:
-        before = len(findings.items)
-        value = findings.number(row, parameter.column)
-        values[parameter.symbol] = value
-        if len(findings.items) == before and not parameter.allows(value):
-            findings.add(row.where, describe_violation(model, unit, parameter.symbol, value))
-        complete = complete and len(findings.items) == before
-    if complete:
-        for text in model.check(values):
-            findings.add(row.where, f"{model.key} of '{unit}' {text}")
-    return values
-
-
-def describe_violation(model: type[Model], unit: str, symbol: str, value: float) -> str:
-    """Return the sentence about a parameter outside its bounds."""
-    parameter = next(item for item in model.parameters if item.symbol == symbol)
-    unit_text = "" if parameter.unit == "1" else f" {parameter.unit}"
-    return f"{model.key}.{symbol} of '{unit}' must be {parameter.bounds}{unit_text} (got {value:g})"
-
-
-def _check_references(
-    base: CaseFile | None,
-    buses: Buses,
-    units: Sequence[str],
-    devices: Mapping[str, tuple[Device, ...]],
-    findings: Findings,
+def _check_generation(
+    table: Table, buses: Buses, unit_bus: Integers, machines: Table, findings: Findings
 ) -> None:
-    excited = {device.unit for device in devices["exciter"]}
-    for device in devices["pss"]:
-        if device.unit in units and device.unit not in excited:
-            findings.add(device.where, f"unit '{device.unit}' has a PSS but no exciter to act on")
-    if base is None:
+    """Note generation without a unit: nothing would give it once time runs."""
+    if not machines.is_whole or not machines.rows or _NO_BUS in unit_bus:
         return
-    for sensor in base.sensors:
-        findings.known("case.yaml", "bus", sensor, buses.number.tolist())
-    for area in sorted(set(buses.area) - set(base.areas)):
-        findings.known("bus.csv", "area", area, base.areas)
-    tie = base.tie_mode
-    named = [*tie.units, *tie.against] if tie else []
-    for unit in [*named, *([base.plot_unit] if base.plot_unit else [])]:
-        findings.known("case.yaml", "unit", unit, units)
+    for at, row in enumerate(table.rows):
+        if at not in unit_bus and (buses.kind[at] != "pq" or buses.p_gen[at] != 0):
+            findings.add(
+                row.where,
+                f"bus {row.cells['bus']} has no unit in machine.csv, so it must be of kind pq with "
+                f"p_gen_pu 0 (got {buses.kind[at]} and {row.cells['p_gen_pu']})",
+            )
+
+
+def _check_excited(stabilisers: Table, exciters: Table, findings: Findings) -> None:
+    if exciters.is_whole:
+        excited = _text(exciters.rows, "unit")
+        for row in stabilisers.rows:
+            if row.cells["unit"] not in excited:
+                findings.add(
+                    row.where, f"unit '{row.cells['unit']}' has a PSS but no exciter to act on"
+                )

@@ -4,10 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tieline.errors import InputError, TielineError
+from tieline.grid.average import rotor_weights, sensor_weights
 from tieline.grid.case import Case
 from tieline.grid.devices import groups, with_pss
 from tieline.grid.events import plan_events
 from tieline.grid.initialise import initial_states
+from tieline.grid.network import islands
 from tieline.grid.powerflow import solve_power_flow
 from tieline.grid.settings import GridSettings
 from tieline.grid.tables import near
@@ -32,39 +34,77 @@ def check(case: Case, grid: GridSettings, wams: WamsSettings) -> Sites:
 
     Raises:
         InputError: unknown units, buses or branches, events that cannot happen, stabilisers that
-            cannot act, a power flow that diverges, limits violated at the start; every finding.
+            cannot act, a network in parts, a power flow that diverges, limits violated at the
+            start; every finding.
     """
-    findings: list[str] = []
+    findings = [*_unknown_sensors(case, wams), *_unmeasured_average(grid, wams)]
 
-    def attempt(part: Callable[[], object]) -> None:
+    def attempt(part: Callable[[], Case | None]) -> Case | None:
         try:
-            part()
+            return part()
         except InputError as error:
             findings.extend(error.findings)
         except TielineError as error:
             findings.append(str(error))
+        return None
 
-    def start() -> None:
-        initial_states(case, solve_power_flow(case), groups(case, {}))
-
-    sensors = sensor_buses(case, wams)
-    known = [str(number) for number in case.buses.number]
-    for bus in sensors:
-        if bus not in case.buses.number:
-            findings.append(
-                f"wams.sensors: no bus {bus} in case '{case.name}'{near(str(bus), known)}"
-            )
-    if grid.pss.average == "rotors" and wams.reporting != "continuous":
-        findings.append(
-            "grid.pss.average: rotors is no measurement, so it needs wams.reporting: continuous "
-            f"(got {wams.reporting})"
-        )
-    attempt(lambda: with_pss(case, grid.pss))
-    attempt(lambda: plan_events(case, grid))
-    attempt(start)
+    if not findings:
+        attempt(lambda: _weigh(case, grid, wams))
+    fitted = attempt(lambda: with_pss(case, grid.pss))
+    parts = _parts(case)
+    if parts:
+        findings += parts
+    else:
+        attempt(lambda: _settle(fitted or case))
+        attempt(lambda: _plan(case, grid))
     if findings:
         raise InputError(findings)
-    return Sites(sensors, controllers(with_pss(case, grid.pss)))
+    assert fitted is not None
+    return Sites(sensor_buses(case, wams), controllers(fitted))
+
+
+def _settle(case: Case) -> None:
+    initial_states(case, solve_power_flow(case), groups(case, {}))
+
+
+def _weigh(case: Case, grid: GridSettings, wams: WamsSettings) -> None:
+    if grid.pss.average == "rotors":
+        rotor_weights(case, wams.weights)
+    else:
+        sensor_weights(case, sensor_buses(case, wams), wams.weights)
+
+
+def _plan(case: Case, grid: GridSettings) -> None:
+    plan_events(case, grid)
+
+
+def _unknown_sensors(case: Case, wams: WamsSettings) -> list[str]:
+    known = [str(number) for number in case.buses.number]
+    return [
+        f"wams.sensors: no bus {bus} in case '{case.name}'{near(str(bus), known)}"
+        for bus in sensor_buses(case, wams)
+        if bus not in case.buses.number
+    ]
+
+
+def _unmeasured_average(grid: GridSettings, wams: WamsSettings) -> list[str]:
+    if grid.pss.average != "rotors" or wams.reporting == "continuous":
+        return []
+    return [
+        "grid.pss.average: rotors is no measurement, so it needs wams.reporting: continuous "
+        f"(got {wams.reporting})"
+    ]
+
+
+def _parts(case: Case) -> list[str]:
+    """Return a finding for each part of the network that no branch joins to the slack bus."""
+    slack = case.buses.kind.index("slack")
+    return [
+        f"branch.csv: buses {case.buses.number[island].tolist()} of case '{case.name}' are not "
+        f"connected to the slack bus {case.buses.number[slack]}"
+        for island in islands(case.branches, len(case.buses.number))
+        if slack not in island
+    ]
 
 
 def sensor_buses(case: Case, wams: WamsSettings) -> tuple[int, ...]:

@@ -84,4 +84,6 @@ def rhs(functions: Any, plan: Plan, work: Work, x: Floats, dx: Floats) -> bool:
             if plan.average.mode != HELD and plan.average.delay_steps == 0:
                 work.signals[WBAR] = average_now(plan.average, plan.sensors, x)
         run_job(functions, plan.jobs, work, j, x, dx)
+    for place in plan.frozen:
+        dx[place] = 0.0
     return solved

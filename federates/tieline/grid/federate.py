@@ -1,6 +1,6 @@
 """The grid as a participant of the federation: takes deliveries, integrates, sends frames."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,22 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tieline.cosim.interfaces import GRID, Clock, DeliveryBundle, FrameBundle
-from tieline.errors import InputError, TimeContractBroken
+from tieline.errors import TimeContractBroken
+from tieline.grid.average import continuous_average, sensor_weights
 from tieline.grid.case import Case, load_case
 from tieline.grid.check import sensor_buses
 from tieline.grid.devices import with_pss
 from tieline.grid.events import plan_events
-from tieline.grid.plan import HELD, SENSORS, Average
+from tieline.grid.models.registry import use_file
+from tieline.grid.plan import HELD, Average
 from tieline.grid.powerflow import solve_power_flow
 from tieline.grid.recorder import Recorder
 from tieline.grid.settings import GridSettings
 from tieline.grid.simulation import Grid
-from tieline.grid.system import build_system, rotor_average, sensor_average
+from tieline.grid.system import build_system, sensor_average
 from tieline.tables import Column, write_table
 from tieline.units import NS_PER_S, seconds_to_ns, tick_ns
 from tieline.wams import PmuReporter, WideAreaAverage
 from tieline.wams.settings import WamsSettings
 
+Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
@@ -53,6 +56,7 @@ class GridRun:
         """
         settings = GridSettings.model_validate(run["grid"])
         wams = WamsSettings.model_validate(run["wams"])
+        use_file("pss", settings.pss.file)
         case = with_pss(load_case(Path(run["case"])), settings.pss)
         fitted = [case.units.index(item["unit"]) for item in run["destinations"]]
         is_continuous = wams.reporting == "continuous"
@@ -86,21 +90,22 @@ class GridFederate:
         self._folder = folder
         case, settings, clock = run.case, run.settings, run.clock
         sensors = sensor_buses(case, run.wams)
-        system = build_system(case, solve_power_flow(case), sensors, _average(run, len(sensors)))
+        of_rotors = settings.pss.average == "rotors"
+        weights = sensor_weights(case, sensors, "equal" if of_rotors else run.wams.weights)
+        average = _average(run, sensors, weights)
+        system = build_system(case, solve_power_flow(case), sensors, average)
         self._grid = Grid(
             system,
             method=settings.method,
             steps_per_second=settings.steps_per_second,
-            events=plan_events(case, settings),
+            events=plan_events(case, settings, tuple(sensors)),
         )
         self._per_interval = settings.steps_per_second // clock.rate_hz
         self._per_record = settings.steps_per_second // settings.records_per_second
         idcodes = np.arange(1, len(sensors) + 1)
         f0_hz = float(case.base.frequency_Hz)
         self._reporter = PmuReporter(idcodes, case.buses.base_kV[system.sensor_bus] * 1e3)
-        self._belief = WideAreaAverage(
-            len(run.fitted), idcodes, _weights(run.wams, len(sensors)), f0_hz
-        )
+        self._belief = WideAreaAverage(len(run.fitted), idcodes, weights, f0_hz)
         self._wbar = np.ones(len(case.units))
         is_fitted = np.zeros(len(case.units))
         is_fitted[run.fitted] = 1.0
@@ -108,7 +113,7 @@ class GridFederate:
 
     def start(self) -> bytes:
         """Return the frames measured at t_0."""
-        return self._frames()
+        return self._frames(0)
 
     def advance(self, k: int, received: bytes) -> bytes:
         """Integrate [t_k, t_k+1], each delivery at its step boundary; return the frames of t_k+1.
@@ -132,12 +137,13 @@ class GridFederate:
                 self._grid.believe(self._wbar)
             if tick % self._per_record == 0 and tick < last:
                 self._record()
-        return self._frames()
+        return self._frames(last)
 
     def finish(self) -> None:
         """Record the last instant and complete the tables."""
         self._record()
         self._recorder.close()
+        self._write_log()
         counts = self._belief.counts
         columns = [Column("controller", "", "number of the controller", "int64")]
         columns.append(Column("unit", "", "unit that it belongs to", "str"))
@@ -151,34 +157,58 @@ class GridFederate:
     def abort(self, reason: str) -> None:
         """Close grid.parquet over what was recorded."""
         self._recorder.close()
+        self._write_log()
+
+    def _write_log(self) -> None:
+        """Write events.parquet: what happened when, with the ending of a run that is over."""
+        rate, log, ending = self._grid.steps_per_second, self._grid.log, self._grid.ending
+        columns = [
+            Column("t_s", "s", "simulated time"),
+            Column("what", "", "event, or why the run ended", "str"),
+            Column("is_ending", "", "1 if the run ended with it", "int64"),
+        ]
+        is_ending = [ending is not None and text == ending.text for _, text in log]
+        data = {
+            "t_s": np.array([tick / rate for tick, _ in log], np.float64),
+            "what": np.array([text for _, text in log], dtype=object),
+            "is_ending": np.array(is_ending, np.int64),
+        }
+        write_table(self._folder / "events.parquet", columns, data)
 
     def _record_ticks(self, first: int, last: int) -> range:
         start = -(-first // self._per_record) * self._per_record
         return range(start, last, self._per_record)
 
     def _boundaries(self, bundle: DeliveryBundle, first: int, last: int) -> Integers:
-        """Return (deliveries,) the first step boundary at or after each arrival."""
+        """Return (deliveries,) the first step boundary at or after each arrival.
+
+        Raises:
+            TimeContractBroken: a delivery lies outside the interval.
+        """
+        rate = self._grid.steps_per_second
         arrival = bundle.records["arrival_ns"].astype(np.int64)
-        ticks = -(-arrival * self._grid.steps_per_second // NS_PER_S)
-        if len(ticks) and not (first <= ticks.min() and ticks.max() <= last):
-            since = tick_ns(first, self._grid.steps_per_second)
-            until = tick_ns(last, self._grid.steps_per_second)
+        since, until = tick_ns(first, rate), tick_ns(last, rate)
+        if len(arrival) and not (since <= arrival.min() and arrival.max() <= until):
             raise TimeContractBroken(
                 f"deliveries at {arrival.min()} to {arrival.max()} ns came for the interval from "
                 f"{since} to {until} ns"
             )
-        return ticks
+        return -(-arrival * rate // NS_PER_S)
 
-    def _frames(self) -> bytes:
-        rate = self._grid.steps_per_second
-        now_ns = tick_ns(self._grid.tick, rate)
-        if self._run.delay_ns is not None:
+    def _frames(self, tick: int) -> bytes:
+        """Return the frames of a tick; none when the average needs none, or the run is over."""
+        now_ns = tick_ns(tick, self._grid.steps_per_second)
+        if self._run.delay_ns is not None or self._grid.ending is not None:
             return FrameBundle(now_ns, np.zeros((0, 0), np.uint8)).to_bytes()
         reading = self._grid.reading()
-        payloads = self._reporter.frames(now_ns, reading.v, reading.f_hz, reading.rocof_hz_s)
+        payloads = self._reporter.frames(
+            now_ns, reading.v, reading.f_hz, reading.rocof_hz_s, reading.is_live
+        )
         return FrameBundle(now_ns, payloads).to_bytes()
 
     def _record(self) -> None:
+        if self._grid.ending is not None:
+            return
         now_ns = tick_ns(self._grid.tick, self._grid.steps_per_second)
         if self._run.delay_ns is None:
             age_s = self._belief.age_s(now_ns)
@@ -187,36 +217,10 @@ class GridFederate:
         self._recorder.record(age_s)
 
 
-def _weights(wams: WamsSettings, sensors: int) -> list[float]:
-    return [1.0] * sensors if wams.weights == "equal" else list(wams.weights)
-
-
-def _average(run: GridRun, sensors: int) -> Average:
-    """Return how wbar is formed inside the grid; held when frames bring it.
-
-    Raises:
-        InputError: the delay of a continuous average does not fit the step.
-    """
-    weights = np.array(_weights(run.wams, sensors))
+def _average(run: GridRun, sensors: Sequence[int], weights: Floats) -> Average:
+    """Return how wbar is formed inside the grid; held when frames bring it."""
     if run.delay_ns is None:
         return sensor_average(weights, mode=HELD)
-    steps = _delay_steps(run)
-    if run.settings.pss.average == "rotors":
-        return rotor_average(np.ones(len(run.case.units)), steps)
-    return sensor_average(weights, steps, SENSORS)
-
-
-def _delay_steps(run: GridRun) -> int:
-    assert run.delay_ns is not None
-    rate = run.settings.steps_per_second
-    steps = round(run.delay_ns * rate / NS_PER_S)
-    if abs(tick_ns(steps, rate) - run.delay_ns) > 1:
-        raise InputError(
-            f"network.delay: with continuous reporting it must be a whole number of steps of "
-            f"1/{rate} s (got {run.delay_ns / NS_PER_S:g} s; {steps / rate:.9g} s would do)"
-        )
-    if steps == 1 and run.settings.method == "rk4":
-        raise InputError(
-            f"network.delay: rk4 needs 0 or at least two steps of 1/{rate} s (got one)"
-        )
-    return steps
+    # An experiment is refused unless its delay is a whole number of steps.
+    steps = round(run.delay_ns * run.settings.steps_per_second / NS_PER_S)
+    return continuous_average(run.case, sensors, run.wams, run.settings.pss.average, steps)

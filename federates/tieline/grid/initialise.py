@@ -25,28 +25,41 @@ def initial_states(
     """Return the states (states, n) of each group and the signals (signals, units) at rest.
 
     Raises:
-        NumericalError: a unit's operating point violates a limit; names the unit and the limit.
+        NumericalError: a unit's operating point violates a limit or is not finite; names the unit.
     """
     signals = np.zeros((len(SIGNALS), len(case.units)))
     named = dict(zip(SIGNALS, signals, strict=True))
     v = flow.phasor[case.unit_bus]
     current = _unit_current(case, flow)
     named["v_re"][:], named["v_im"][:], named["vt"][:] = v.real, v.imag, np.abs(v)
+    named["i_re"][:], named["i_im"][:] = current.real, current.imag
+    named["Pe"][:] = (v * current.conj()).real
     for name in ("omega", "wbar", "w0"):
         named[name][:] = 1.0
     named["w_s"][:] = 2.0 * np.pi * case.base.frequency_Hz
     states = []
     for group in found:
         local = {name: row[group.units] for name, row in named.items()}
-        local |= {"i_re": current.real[group.units], "i_im": current.imag[group.units]}
-        try:
-            states.append(np.ascontiguousarray(group.model.initialise(local, group.p)))
-        except OutsideLimitError as error:
-            unit = case.units[group.units[error.position]]
-            raise NumericalError(f"{group.model.key} of '{unit}': {error}") from error
+        states.append(_at_rest(case, group, local))
         for name, row in named.items():
             row[group.units] = local[name]
     return states, signals
+
+
+def _at_rest(case: Case, group: Group, local: dict[str, Floats]) -> Floats:
+    try:
+        # What overflows is found below, as a state that is not finite.
+        with np.errstate(all="ignore"):
+            x = np.ascontiguousarray(group.model.initialise(local, group.p))
+    except OutsideLimitError as error:
+        unit = case.units[group.units[error.position]]
+        raise NumericalError(f"{group.model.key} of '{unit}': {error}") from error
+    for row, column in np.argwhere(~np.isfinite(x)):
+        unit = case.units[group.units[column]]
+        raise NumericalError(
+            f"{group.model.key} of '{unit}': {group.model.states[row]} is not finite at the start"
+        )
+    return x
 
 
 def _unit_current(case: Case, flow: PowerFlow) -> NDArray[np.complex128]:

@@ -14,11 +14,14 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 V_LOW_PU = 0.5
-"""Below this voltage every load is a constant impedance, joined continuously."""
+"""At and below this voltage a load is its nominal constant impedance, as in the reference: its
+current jumps there. A load for which neither side has a solution stays an impedance."""
 
 V_TOLERANCE_PU = 1e-12
 """Largest change of a voltage in the last sweep; the error left is then about a fifth of it."""
 MAX_SWEEPS = 60
+SWEEPS_TO_CHOOSE = 20
+"""Sweeps after which a load at low voltage stays an impedance for the rest of the solution."""
 
 
 class LoadCurrents(NamedTuple):
@@ -64,15 +67,17 @@ def correction(loads: LoadCurrents, k: int, v: complex) -> complex:
     """Return the current that the network's constant impedance draws too much for load `k` at `v`.
 
     With r = |V| / V0, P(r) = P0 (z r^2 + i r + s), likewise Q, and the load drawing conj(S / V),
-    this is Y0 V - conj(S(V) / V). Below `V_LOW_PU` the admittance stays what it is there.
+    this is Y0 V - conj(S(V) / V); at and below `V_LOW_PU` it is nothing.
     """
-    held = max(abs(v), V_LOW_PU)
-    r = held / loads.v0[k]
+    size = abs(v)
+    if size <= V_LOW_PU:
+        return complex(0.0, 0.0)
+    r = size / loads.v0[k]
     p_rest = 1.0 - loads.p_power[k] - loads.p_current[k]
     q_rest = 1.0 - loads.q_power[k] - loads.q_current[k]
     p = loads.p0[k] * (p_rest * r * r + loads.p_current[k] * r + loads.p_power[k])
     q = loads.q0[k] * (q_rest * r * r + loads.q_current[k] * r + loads.q_power[k])
-    return (loads.admittance[k] - complex(p, -q) / (held * held)) * v
+    return (loads.admittance[k] - complex(p, -q) / (size * size)) * v
 
 
 @compiled
@@ -97,10 +102,13 @@ def settle(
     extra = np.empty(count, np.complex128)
     for k in range(count):
         here[k] = v[loads.bus[k]]
+    stays_low = np.zeros(count, np.bool_)
     converged = False
-    for _ in range(MAX_SWEEPS):
+    for sweep in range(MAX_SWEEPS):
         for k in range(count):
-            extra[k] = correction(loads, k, here[k])
+            if sweep > SWEEPS_TO_CHOOSE and abs(here[k]) <= V_LOW_PU:
+                stays_low[k] = True
+            extra[k] = 0.0 if stays_low[k] else correction(loads, k, here[k])
         converged = True
         for k in range(count):
             value = v_open[loads.bus[k]]
@@ -113,7 +121,8 @@ def settle(
         if converged:
             break
     for k in range(count):
-        current[loads.bus[k]] += correction(loads, k, here[k])
+        if not stays_low[k]:
+            current[loads.bus[k]] += correction(loads, k, here[k])
     return converged
 
 
@@ -127,4 +136,5 @@ def load_transfer(factors: Factors, loads: LoadCurrents) -> Complexes:
         unit[bus] = 1.0
         solve(factors, unit, scratch, v)
         columns.append(v[loads.bus])
-    return np.ascontiguousarray(np.array(columns, np.complex128).reshape(len(columns), -1).T)
+    square = (len(columns), len(columns))
+    return np.ascontiguousarray(np.array(columns, np.complex128).reshape(square).T)

@@ -53,12 +53,15 @@ class Average(NamedTuple):
         weight: (sensors,) or (units,), sum 1.
         omega: (units,) places of the rotor speeds in x.
         delay_steps: whole steps by which the average is late; 0 when it is not.
+        share: (members, units) what each unit adds to each weight, to be taken out with it; (0, 0)
+            when the weights do not depend on units.
     """
 
     mode: int
     weight: Floats
     omega: Integers
     delay_steps: int
+    share: Floats
 
 
 class Plan(NamedTuple):
@@ -67,6 +70,7 @@ class Plan(NamedTuple):
     Attributes:
         unit_bus: (units,) bus index; unit_admittance: (units,) Norton admittance, system base.
         load_transfer: (loads, loads) voltages for unit currents, of these factors.
+        frozen: places in x of states that an event has stopped.
     """
 
     jobs: Jobs
@@ -77,6 +81,7 @@ class Plan(NamedTuple):
     load_transfer: Complexes
     sensors: Sensors
     average: Average
+    frozen: Integers
 
 
 class Work(NamedTuple):

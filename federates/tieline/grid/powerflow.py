@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sparse
 from numpy.typing import NDArray
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu
 
 from tieline.errors import NumericalError
 from tieline.grid.case import Case
@@ -43,6 +43,8 @@ class PowerFlow:
         return self.v * np.exp(1j * self.theta)
 
 
+# What overflows on the way ends as a mismatch that is not finite, and is refused as such.
+@np.errstate(all="ignore")
 def solve_power_flow(case: Case, *, max_iterations: int = 30) -> PowerFlow:
     """Return the operating point that the case's schedule gives.
 
@@ -61,24 +63,33 @@ def solve_power_flow(case: Case, *, max_iterations: int = 30) -> PowerFlow:
         phasor = v * np.exp(1j * theta)
         excess = phasor * (y @ phasor).conj() - scheduled
         mismatch = np.concatenate([excess.real[free_angle], excess.imag[free_v]])
-        worst = int(np.argmax(np.abs(mismatch)))
-        if not np.isfinite(mismatch[worst]) or v.min() <= 0:
+        largest = float(np.abs(mismatch).max(initial=0.0))
+        if not np.isfinite(largest) or v.min() <= 0:
             break
-        if abs(mismatch[worst]) < TOLERANCE_PU:
+        if largest < TOLERANCE_PU:
             s_gen = excess + scheduled + buses.p_load + 1j * buses.q_load
-            flow = PowerFlow(
-                v, theta, s_gen.real, s_gen.imag, iteration, float(abs(mismatch[worst]))
-            )
+            flow = PowerFlow(v, theta, s_gen.real, s_gen.imag, iteration, largest)
             _check_reactive_limits(case, flow)
             return flow
-        step = spsolve(_jacobian(y, phasor, free_angle, free_v), -mismatch)
+        step = _solve(case, _jacobian(y, phasor, free_angle, free_v), -mismatch)
         theta[free_angle] += step[: len(free_angle)]
         v[free_v] += step[len(free_angle) :]
+    worst = int(np.argmax(np.abs(mismatch)))
     bus = buses.number[np.concatenate([free_angle, free_v])[worst]]
     raise NumericalError(
         f"the power flow of case '{case.name}' diverged after {iteration} iterations: mismatch "
         f"{mismatch[worst]:.3g} pu at bus {bus}; check its schedule, load and branches"
     )
+
+
+def _solve(case: Case, jacobian: sparse.csc_matrix, right: Floats) -> Floats:
+    try:
+        return np.asarray(splu(jacobian).solve(right), np.float64)
+    except RuntimeError as error:
+        raise NumericalError(
+            f"the power flow of case '{case.name}' has a singular Jacobian; a bus may hang on the "
+            f"rest by no branch ({error})"
+        ) from error
 
 
 def _jacobian(
@@ -98,6 +109,11 @@ def _jacobian(
 
 
 def _check_reactive_limits(case: Case, flow: PowerFlow) -> None:
+    """Raise for units beyond their limits; equal limits stand for none.
+
+    Raises:
+        NumericalError: a bus's reactive generation lies outside; names each.
+    """
     buses = case.buses
     has_limit = buses.q_gen_max > buses.q_gen_min
     outside = has_limit & ((flow.q_gen > buses.q_gen_max) | (flow.q_gen < buses.q_gen_min))

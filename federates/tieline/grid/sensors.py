@@ -19,6 +19,9 @@ Floats = NDArray[np.float64]
 A1 = 28.8394098913241
 B = 277.237187626600
 
+DEAD_PU = 1e-6
+"""Voltage below which a bus counts as dead."""
+
 
 class Sensors(NamedTuple):
     """The sensors' buses (m,), the place of their states in x and the system frequency, Hz."""
@@ -37,6 +40,8 @@ def filter_angles(sensors: Sensors, v: NDArray[np.complex128], x: Floats, dx: Fl
     phasor = v[sensors.bus]
     gap = np.arctan2(phasor.imag, phasor.real) - z1
     gap = gap - 2.0 * np.pi * np.floor(gap / (2.0 * np.pi) + 0.5)
+    # A dead bus has no angle: its estimate runs down to the nominal frequency.
+    gap = np.where(np.abs(phasor.real) + np.abs(phasor.imag) > DEAD_PU, gap, 0.0)
     dx[sensors.x0 : sensors.x0 + count] = z2
     dx[sensors.x0 + count : sensors.x0 + 2 * count] = B * gap - A1 * z2
 

@@ -7,8 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tieline.errors import NumericalError
-from tieline.grid.equations import WBAR, rhs
-from tieline.grid.events import Switching
+from tieline.grid.agenda import Agenda
+from tieline.grid.average import inertia, without_tripped
+from tieline.grid.conditions import UNIT_QUANTITIES, Condition
+from tieline.grid.equations import WBAR, average_now, rhs
+from tieline.grid.events import Disturbance
 from tieline.grid.integrate import (
     DONE,
     HISTORY_MARGIN,
@@ -17,12 +20,21 @@ from tieline.grid.integrate import (
     advance,
     late_average,
 )
-from tieline.grid.loads import load_transfer
 from tieline.grid.models.base import SIGNALS
-from tieline.grid.network import factorise
-from tieline.grid.plan import HELD, ROTORS, Work
+from tieline.grid.plan import HELD, Work
 from tieline.grid.sensors import frequencies
+from tieline.grid.stability import Ending, lost
 from tieline.grid.system import System
+from tieline.grid.topology import (
+    Change,
+    NetworkState,
+    changed,
+    live_buses,
+    units_in_service,
+)
+
+LOOKS_PER_SECOND = 60
+"""How often it is checked that every unit is still within bounds."""
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -34,11 +46,13 @@ class Reading:
 
     Attributes:
         v: phasors, pu; f_hz: frequency; rocof_hz_s: its rate of change.
+        is_live: False at a bus without voltage.
     """
 
     v: Complexes
     f_hz: Floats
     rocof_hz_s: Floats
+    is_live: NDArray[np.bool_]
 
 
 class Grid:
@@ -54,23 +68,27 @@ class Grid:
         *,
         method: str,
         steps_per_second: int,
-        events: Sequence[Switching] = (),
+        events: Sequence[Disturbance] = (),
     ) -> None:
         self.system = system
         self.steps_per_second = steps_per_second
         self.tick = 0
         self.in_service = np.ones(len(system.case.units), dtype=bool)
+        self.is_live = np.ones(len(system.flow.v), dtype=bool)
+        self.ending: Ending | None = None
+        self.log: list[tuple[int, str]] = []
         self._method = METHODS[method]
         self._plan = system.plan
-        self._pending = sorted(events, key=lambda event: event.tick)
-        self._is_open: set[int] = set()
+        self._per_look = max(1, steps_per_second // LOOKS_PER_SECOND)
+        self._agenda = Agenda(events)
+        self._network = NetworkState()
         self._work = _copy(system.work)
         self._view = _copy(system.work)
         self._x = system.x0.copy()
         self._k = np.zeros((len(self._method.b) + 1, len(self._x)))
         self._dx = np.zeros(len(self._x))
         self._history = np.ones(self._plan.average.delay_steps + HISTORY_MARGIN)
-        self._inertia = system.case.unit_MVA * _inertia(system)
+        self._inertia = system.case.unit_MVA * inertia(system.case)
         self._is_current = False
         self._apply_due()
 
@@ -93,9 +111,14 @@ class Grid:
         """
         if to_tick < self.tick:
             raise ValueError(f"tick {to_tick} lies before the current one, {self.tick}")
-        while self.tick < to_tick:
-            self._run(min([to_tick, *(event.tick for event in self._pending[:1])]))
-            self._apply_due()
+        while self.tick < to_tick and self.ending is None:
+            looked_at = (self.tick // self._per_look + 1) * self._per_look
+            stop = self._agenda.next_stop(self.tick)
+            self._run(min(to_tick, looked_at, to_tick if stop is None else stop))
+            if self.tick % self._per_look == 0 and self.ending is None:
+                self._look()
+            if self.ending is None:
+                self._apply_due()
 
     def _run(self, to_tick: int) -> None:
         self._is_current = False
@@ -112,47 +135,92 @@ class Grid:
             self._method,
         )
         self.tick = reached
-        if status != DONE:
-            raise NumericalError(self._failure(status))
+        if status == NO_NETWORK_SOLUTION and np.isfinite(self._x).all():
+            self._end(Ending(reached, f"voltage collapse: {self._failure(self._work)}"))
+        elif status != DONE:
+            raise NumericalError(self._failure(self._work))
 
-    def _failure(self, status: int) -> str:
+    def _look(self) -> None:
+        """End the run if a unit in service is lost."""
+        omega, delta = self._x[self._plan.average.omega], self._x[self.system.delta]
+        weight = np.where(self.in_service, self._inertia, 0.0)
+        ending = lost(self.system.case, self.tick, omega, delta, weight)
+        if ending is not None:
+            self._end(ending)
+
+    def _end(self, ending: Ending) -> None:
+        self.ending = ending
+        self.log.append((ending.tick, ending.text))
+
+    def _failure(self, work: Work) -> str:
         when = f"at t = {self.tick / self.steps_per_second:.4f} s"
-        if status == NO_NETWORK_SOLUTION:
-            lowest = int(np.argmin(np.abs(self._work.v)))
-            bus = self.system.case.buses.number[lowest]
-            size = abs(self._work.v[lowest])
-            return (
-                f"the load currents did not converge {when}; "
-                f"lowest voltage {size:.3g} pu at bus {bus}"
-            )
-        bad = int(np.flatnonzero(~np.isfinite(self._x))[0])
-        return f"{self.system.labels[bad]} is not finite {when}"
+        for bad in np.flatnonzero(~np.isfinite(self._x)):
+            return f"{self.system.labels[bad]} is not finite {when}"
+        lowest = int(np.argmin(np.abs(work.v)))
+        bus = self.system.case.buses.number[lowest]
+        return (
+            f"the load currents did not converge {when}; "
+            f"lowest voltage {abs(work.v[lowest]):.3g} pu at bus {bus}"
+        )
 
     def _apply_due(self) -> None:
-        while self._pending and self._pending[0].tick <= self.tick:
-            self._apply(self._pending.pop(0))
+        changes = self._agenda.due(self.tick, self._read)
+        for change in changes:
+            self.log.append((self.tick, change.text))
+            for name, unit, size in change.references:
+                self._work.signals[SIGNALS.index(name), unit] += size
+            self._freeze(change)
+            self._network = changed(self._network, change)
+        if any(change.is_of_network for change in changes):
+            self._rebuild()
+        if changes:
+            self._is_current = False
 
-    def _apply(self, event: Switching) -> None:
-        self._is_open |= set(event.branches)
-        matrix = self.system.admittance_matrix(sorted(self._is_open))
-        self.in_service[list(event.units)] = False
-        average = self._plan.average
-        if average.mode == ROTORS and event.units:
-            weight = np.where(self.in_service, average.weight, 0.0)
-            average = average._replace(weight=weight / weight.sum())
-        factors = factorise(matrix)
-        self._plan = self._plan._replace(
-            factors=factors,
-            load_transfer=load_transfer(factors, self._plan.loads),
-            average=average,
-        )
-        self._is_current = False
+    def _rebuild(self) -> None:
+        """Give the plan the network that events have left; units and averages follow."""
+        case = self.system.case
+        self.in_service = units_in_service(case, self._network)
+        live = live_buses(case, self._network)
+        dead = case.buses.number[self.is_live & ~live].tolist()
+        if dead:
+            self.log.append((self.tick, f"buses {dead} are without a unit, and dead"))
+        self.is_live = live
+        average = without_tripped(self.system.plan.average, self.in_service)
+        plan = self.system.after(self._network)
+        self._plan = plan._replace(average=average, frozen=self._plan.frozen)
+        if average.mode != HELD:
+            # A delayed average, too, is without the units that leave from this instant on.
+            now = average_now(average, self._plan.sensors, self._x)
+            self._history[self.tick % len(self._history)] = now
+
+    def _freeze(self, change: Change) -> None:
+        places = [
+            place
+            for unit in sorted(change.blocked)
+            for place, label in enumerate(self.system.labels)
+            if label.startswith("governor.") and label.endswith(f".{self.system.case.units[unit]}")
+        ]
+        frozen = np.array(sorted({*self._plan.frozen.tolist(), *places}), np.int64)
+        self._plan = self._plan._replace(frozen=frozen)
+
+    def _read(self, condition: Condition) -> float:
+        """Return the present value of a condition's quantity."""
+        if condition.quantity == "coi_pu":
+            return self.centre_of_inertia()
+        if condition.quantity in UNIT_QUANTITIES:
+            return float(self.signal(UNIT_QUANTITIES[condition.quantity])[condition.row])
+        if condition.quantity == "f_hz":
+            return float(self.reading().f_hz[condition.row])
+        return float(abs(self.voltages()[condition.row]))
 
     def _refresh(self) -> None:
         """Bring the view to the states of this tick; the integration itself is not touched.
 
         The view works on copies: the load currents start their sweeps from the voltages of the
         last stage, and looking at a grid must not change where it goes, not even in the last bit.
+
+        Raises:
+            NumericalError: the network has no solution.
         """
         if self._is_current:
             return
@@ -161,7 +229,8 @@ class Grid:
         delay = self._plan.average.delay_steps
         if self._plan.average.mode != HELD and delay > 0:
             self._view.signals[WBAR] = late_average(self._history, self.tick, delay, 0)
-        rhs(self.system.functions, self._plan, self._view, self._x, self._dx)
+        if not rhs(self.system.functions, self._plan, self._view, self._x, self._dx):
+            raise NumericalError(self._failure(self._view))
         self._is_current = True
 
     def signal(self, name: str) -> Floats:
@@ -180,19 +249,20 @@ class Grid:
         sensors = self.system.plan.sensors
         first = sensors.x0 + len(sensors.bus)
         rocof = self._dx[first : first + len(sensors.bus)] / (2.0 * np.pi)
-        return Reading(self._view.v[sensors.bus], frequencies(sensors, self._x), rocof)
+        f_hz = frequencies(sensors, self._x)
+        return Reading(self._view.v[sensors.bus], f_hz, rocof, self.is_live[sensors.bus])
 
     def centre_of_inertia(self) -> float:
-        """Return the speed of the units in service, weighted by stored energy, pu."""
+        """Return the speed of the units in service, weighted by stored energy, pu.
+
+        A unit without inertia is left out, and with no other in service the speed is 1.
+        """
         omega = self._x[self._plan.average.omega]
         weight = np.where(self.in_service, self._inertia, 0.0)
+        if not weight.any():
+            return 1.0
         return float(1.0 + (weight * (omega - 1.0)).sum() / weight.sum())
 
 
 def _copy(work: Work) -> Work:
     return Work._make(array.copy() for array in work)
-
-
-def _inertia(system: System) -> Floats:
-    """Return (units,) inertia constants H, s on the machine base."""
-    return np.array([device.values["H"] for device in system.case.devices["machine"]])

@@ -5,20 +5,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sparse
 from numpy.typing import NDArray
 
 from tieline.compiled import first_class
+from tieline.errors import NumericalError
 from tieline.grid.case import Case
 from tieline.grid.devices import Group, groups
 from tieline.grid.equations import rhs
 from tieline.grid.initialise import initial_states, require_rest
 from tieline.grid.loads import load_currents, load_transfer, nominal_admittance
 from tieline.grid.models.base import SIGNALS, SIGNATURE, Equation, Machine, Model
-from tieline.grid.network import admittance, factorise
+from tieline.grid.network import factorise
 from tieline.grid.plan import ROTORS, SENSORS, Average, Jobs, Plan, Work
 from tieline.grid.powerflow import PowerFlow
 from tieline.grid.sensors import Sensors
+from tieline.grid.topology import NetworkState, network_matrix, scaled_loads
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -32,7 +33,7 @@ class System:
         functions: the compiled equations that the plan's jobs name.
         x0: (n,) states at rest, named by `labels` such as `omega.G1` or `z2.B61`.
         work: signals and voltages at rest.
-        sensor_bus: (sensors,) bus indices.
+        sensor_bus: (sensors,) bus indices; delta: (units,) places of the rotor angles in x.
     """
 
     case: Case
@@ -44,13 +45,16 @@ class System:
     labels: tuple[str, ...]
     work: Work
     sensor_bus: Integers
+    delta: Integers
 
-    def admittance_matrix(self, is_open: Sequence[int] = ()) -> sparse.csc_matrix:
-        """Return (n, n) bus admittances with nominal loads and machines, some branches open."""
-        diagonal = nominal_admittance(self.case, self.flow)
-        np.add.at(diagonal, self.plan.unit_bus, self.plan.unit_admittance)
-        network = admittance(self.case.buses, self.case.branches, is_open)
-        return (network + sparse.diags(diagonal)).tocsc()
+    def after(self, state: NetworkState) -> Plan:
+        """Return the plan whose network is what events have made of it.
+
+        Raises:
+            NumericalError: the network's equations have no unique solution.
+        """
+        parts = _network(self.case, self.flow, self.plan.unit_admittance, state)
+        return self.plan._replace(**parts)
 
 
 def build_system(
@@ -70,7 +74,8 @@ def build_system(
         substitute: models to put in place of others, for experiments with equations.
 
     Raises:
-        NumericalError: a limit is violated at the start, or the system is not at rest.
+        NumericalError: a limit is violated at the start, the network has no solution, or the
+            system is not at rest.
     """
     found = groups(case, substitute or {})
     states, signals = initial_states(case, flow, found)
@@ -79,23 +84,18 @@ def build_system(
     filters = Sensors(sensor_bus, int(x0_of[-1]), float(case.base.frequency_Hz))
     angles = np.concatenate([flow.theta[sensor_bus], np.zeros(len(sensor_bus))])
     jobs, functions = _jobs(found, x0_of)
-    omega = _omega_places(found, x0_of, len(case.units))
+    omega = _places(found, x0_of, len(case.units), "omega")
     if average is None:
         average = sensor_average(np.ones(len(sensors)))
-    diagonal = nominal_admittance(case, flow)
     machine = _machine_admittance(case, found)
-    np.add.at(diagonal, case.unit_bus, machine)
-    matrix = (admittance(case.buses, case.branches) + sparse.diags(diagonal)).tocsc()
-    factors, loads = factorise(matrix), load_currents(case, flow)
     plan = Plan(
         jobs=jobs,
         unit_bus=case.unit_bus,
         unit_admittance=machine,
-        factors=factors,
-        loads=loads,
-        load_transfer=load_transfer(factors, loads),
+        **_network(case, flow, machine, NetworkState()),
         sensors=filters,
         average=average._replace(omega=omega),
+        frozen=np.zeros(0, np.int64),
     )
     system = System(
         case=case,
@@ -107,21 +107,24 @@ def build_system(
         labels=_labels(case, found, sensors),
         work=_work(flow, signals, jobs),
         sensor_bus=sensor_bus,
+        delta=_places(found, x0_of, len(case.units), "delta"),
     )
     dx = np.zeros_like(system.x0)
-    rhs(system.functions, plan, system.work, system.x0, dx)
+    if not rhs(system.functions, plan, system.work, system.x0, dx):
+        raise NumericalError("the load currents did not converge at the start")
     require_rest(dx, system.labels)
     return system
 
 
 def sensor_average(weights: Floats, delay_steps: int = 0, mode: int = SENSORS) -> Average:
     """Return the weighted mean of the sensors, formed at every step and `delay_steps` late."""
-    return Average(mode, weights / weights.sum(), np.zeros(0, np.int64), delay_steps)
+    no_places, no_shares = np.zeros(0, np.int64), np.zeros((0, 0))
+    return Average(mode, weights / weights.sum(), no_places, delay_steps, no_shares)
 
 
 def rotor_average(weights: Floats, delay_steps: int = 0) -> Average:
     """Return the weighted mean of the rotor speeds, one weight a unit."""
-    return sensor_average(weights, delay_steps, ROTORS)
+    return sensor_average(weights, delay_steps, ROTORS)._replace(share=np.diag(weights))
 
 
 def _schedule(found: Sequence[Group]) -> tuple[list[tuple[int, Equation]], int]:
@@ -176,6 +179,19 @@ def _jobs(found: Sequence[Group], x0_of: Integers) -> tuple[Jobs, Any]:
     return jobs, first_class(functions, SIGNATURE)
 
 
+def _network(
+    case: Case, flow: PowerFlow, unit_admittance: NDArray[np.complex128], state: NetworkState
+) -> dict[str, Any]:
+    """Return the network's part of a plan: factors, loads and their transfer."""
+    machine = np.zeros(len(flow.v), np.complex128)
+    np.add.at(machine, case.unit_bus, unit_admittance)
+    load = nominal_admittance(case, flow)
+    factors = factorise(network_matrix(case, state, load, machine, flow.v))
+    loads = scaled_loads(load_currents(case, flow), state)
+    transfer = load_transfer(factors, loads)
+    return {"factors": factors, "loads": loads, "load_transfer": transfer}
+
+
 def _machine_admittance(case: Case, found: Sequence[Group]) -> NDArray[np.complex128]:
     result = np.zeros(len(case.units), np.complex128)
     for group in found:
@@ -185,11 +201,11 @@ def _machine_admittance(case: Case, found: Sequence[Group]) -> NDArray[np.comple
     return result
 
 
-def _omega_places(found: Sequence[Group], x0_of: Integers, units: int) -> Integers:
+def _places(found: Sequence[Group], x0_of: Integers, units: int, state: str) -> Integers:
     places = np.zeros(units, np.int64)
     for at, group in enumerate(found):
         if issubclass(group.model, Machine):
-            row = group.model.states.index("omega")
+            row = group.model.states.index(state)
             n = len(group.units)
             places[group.units] = x0_of[at] + row * n + np.arange(n)
     return places

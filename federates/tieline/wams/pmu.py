@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tieline.c37118.batch import checked_idcodes, encode_frames
+from tieline.c37118.constants import StatBit
 
 _SQRT3 = math.sqrt(3.0)
 
@@ -37,6 +38,7 @@ class PmuReporter:
         v: NDArray[np.complex128],
         f_hz: NDArray[np.float64],
         rocof_hz_s: NDArray[np.float64],
+        is_live: NDArray[np.bool_] | None = None,
     ) -> NDArray[np.uint8]:
         """Return the frames (n, 34).
 
@@ -45,7 +47,9 @@ class PmuReporter:
             v: (n,) bus voltages, pu.
             f_hz: (n,) frequencies, Hz.
             rocof_hz_s: (n,) rates of change of frequency, Hz/s.
+            is_live: (n,) False where the bus is dead: its STAT says that the data are no good.
         """
+        stat = 0 if is_live is None else np.where(is_live, 0, int(StatBit.DATA_ERROR))
         return encode_frames(
             self._idcodes,
             measured_ns,
@@ -53,4 +57,5 @@ class PmuReporter:
             f_hz,
             rocof_hz_s,
             epoch_s=self._epoch_s,
+            stat=stat,
         )

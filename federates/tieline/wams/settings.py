@@ -20,6 +20,12 @@ class WamsSettings(BaseModel):
     sensors: Literal["default"] | Annotated[list[StrictInt], Field(min_length=1)] = Field(
         "default", description="bus numbers that carry a PMU, or the case's own list"
     )
-    weights: Literal["equal"] | list[Annotated[StrictFloat, Field(ge=0)]] = Field(
-        "equal", description="weight of each sensor in wbar; scaled to sum 1"
+    weights: Literal["equal", "H", "H_MVA"] | list[Annotated[StrictFloat, Field(ge=0)]] = Field(
+        "equal",
+        description=(
+            "weight of each sensor in wbar (of each rotor with grid.pss.average: rotors), scaled "
+            "to sum 1: equal; the inertia constant H of the units next to it; H times their "
+            "rating; or a list. When a unit trips, a continuous average by H or H_MVA, and any of "
+            "rotors, drops it; controllers that live on frames cannot know and keep their weights"
+        ),
     )

@@ -9,6 +9,7 @@ Inputs and outputs are names of signals, one value a unit:
 
     omega    rotor speed, pu                    delta    rotor angle against the system frame, rad
     v_re, v_im  terminal voltage, pu            vt       its magnitude, pu
+    i_re, i_im  terminal current out of the machine, machine base
     Epp_re, Epp_im  voltage behind r_a + j x'', pu
     Pe       electrical power, machine base     Ifd      field current, pu
     Efd      field voltage, pu                  Pm       mechanical power, machine base
@@ -29,7 +30,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 SIGNALS = (
-    "omega", "delta", "v_re", "v_im", "vt", "Epp_re", "Epp_im", "Pe", "Ifd",
+    "omega", "delta", "v_re", "v_im", "vt", "i_re", "i_im", "Epp_re", "Epp_im", "Pe", "Ifd",
     "Efd", "Pm", "v_s", "wbar", "Vref", "Pref", "w0", "w_s",
 )  # fmt: skip
 
@@ -45,9 +46,10 @@ class Parameter:
 
     Attributes:
         symbol: the standard's symbol; `Xd_p` reads X'd.
-        unit: `pu` (machine base), `s`, `MVA` or `1`.
+        unit: `pu` (machine base), `s`, `pu_s`, `rad_s`, `deg`, `MVA` or `1`.
         text: one sentence.
         above, at_least, below, at_most: bounds, each None when there is none.
+        default: value where neither table nor experiment gives one; None when one must.
     """
 
     symbol: str
@@ -57,6 +59,7 @@ class Parameter:
     at_least: float | None = None
     below: float | None = None
     at_most: float | None = None
+    default: float | None = None
 
     @property
     def column(self) -> str:
@@ -145,16 +148,27 @@ class Model:
 class Machine(Model):
     """A model that stands behind its own impedance in the network.
 
-    `norton` gives the voltage behind `ra + j xpp` before the network is solved.
+    Its `initialise` is the first of its unit's and fixes E_fd, I_fd and P_m for the controls; its
+    equations before the last write P_e, I_fd and the terminal current.
+
+    Attributes:
+        norton: gives the voltage behind `ra + j xpp` before the network is solved.
+        controls: the roles that a unit with this machine may carry besides.
     """
 
     role = "machine"
     norton: ClassVar[Equation]
+    controls: ClassVar[frozenset[str]] = frozenset({"exciter", "governor", "pss"})
 
     @classmethod
     def impedance(cls, p: Array) -> NDArray[np.complex128]:
         """Return (n,) the impedance behind which `Epp` stands, machine base."""
         raise NotImplementedError
+
+    @classmethod
+    def inertia(cls, p: Array) -> Array:
+        """Return (n,) H in s, machine base; 0 leaves a unit out of every average of speeds."""
+        return p[[parameter.symbol for parameter in cls.parameters].index("H")]
 
 
 def indices(names: Sequence[str] | Sequence[Parameter]) -> Any:

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from tieline.compiled import compiled
 from tieline.grid.models.base import Array, Equation, Machine, Parameter, indices
+from tieline.grid.models.park import to_network
 
-PARAMETERS = (
+PARAMETERS: tuple[Parameter, ...] = (
     Parameter("H", "s", "inertia constant", above=0),
     Parameter("D", "pu", "damping torque per speed deviation", at_least=0),
     Parameter("ra", "pu", "armature resistance", at_least=0),
@@ -32,7 +33,7 @@ X = indices(STATES)
 
 
 @compiled
-def _fluxes(x: Array, p: Array) -> tuple[Array, Array]:
+def fluxes(x: Array, p: Array) -> tuple[Array, Array]:
     """Return psi''_d and psi''_q."""
     share_d = (p[P.xd_pp] - p[P.xl]) / (p[P.xd_p] - p[P.xl])
     share_q = (p[P.xq_pp] - p[P.xl]) / (p[P.xq_p] - p[P.xl])
@@ -42,7 +43,7 @@ def _fluxes(x: Array, p: Array) -> tuple[Array, Array]:
 
 
 @compiled
-def _currents(x: Array, u: Array, p: Array, psi_d: Array, psi_q: Array) -> tuple[Array, Array]:
+def currents(x: Array, u: Array, p: Array, psi_d: Array, psi_q: Array) -> tuple[Array, Array]:
     """Return i_d and i_q, given the terminal voltage in the first two rows of `u`."""
     sin, cos = np.sin(x[X.delta]), np.cos(x[X.delta])
     d_d = -x[X.omega] * psi_q - (sin * u[0] - cos * u[1])
@@ -53,7 +54,7 @@ def _currents(x: Array, u: Array, p: Array, psi_d: Array, psi_q: Array) -> tuple
 
 
 @compiled
-def _field_current(x: Array, p: Array, i_d: Array) -> Array:
+def field_current(x: Array, p: Array, i_d: Array) -> Array:
     """Return I_fd = E'_q + (x_d - x'_d) [i_d + (x'_d - x'') / (x'_d - x_l)^2 e_a]."""
     span = p[P.xd_p] - p[P.xl]
     e_a = x[X.Eq_p] - x[X.psi_kd] - span * i_d
@@ -68,7 +69,7 @@ def norton(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
     E'' = omega [(psi''_d cos delta - psi''_q sin delta)
                  + j (psi''_q cos delta + psi''_d sin delta)]
     """
-    psi_d, psi_q = _fluxes(x, p)
+    psi_d, psi_q = fluxes(x, p)
     sin, cos = np.sin(x[X.delta]), np.cos(x[X.delta])
     y[0] = x[X.omega] * (psi_d * cos - psi_q * sin)
     y[1] = x[X.omega] * (psi_q * cos + psi_d * sin)
@@ -77,29 +78,56 @@ def norton(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
 
 
 def electrical(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
-    """Write terminal power and field current."""
-    psi_d, psi_q = _fluxes(x, p)
-    i_d, i_q = _currents(x, u, p, psi_d, psi_q)
+    """Write terminal power, field current and terminal current."""
+    psi_d, psi_q = fluxes(x, p)
+    i_d, i_q = currents(x, u, p, psi_d, psi_q)
     sin, cos = np.sin(x[X.delta]), np.cos(x[X.delta])
     y[0] = (sin * u[0] - cos * u[1]) * i_d + (cos * u[0] + sin * u[1]) * i_q
-    y[1] = _field_current(x, p, i_d)
+    y[1] = field_current(x, p, i_d)
+    y[2], y[3] = to_network(x[X.delta], i_d, i_q)
 
 
-def motion(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
+@compiled
+def move(x: Array, u: Array, p: Array, dx: Array) -> None:
     """Write the derivatives of rotor and fluxes (equations in the class docstring)."""
-    psi_d, psi_q = _fluxes(x, p)
-    i_d, i_q = _currents(x, u, p, psi_d, psi_q)
+    psi_d, psi_q = fluxes(x, p)
+    i_d, i_q = currents(x, u, p, psi_d, psi_q)
     Efd, Pm, w_s = u[2], u[3], u[4]
     span_q = p[P.xq_p] - p[P.xl]
     e_b = x[X.Ed_p] - x[X.psi_kq] - span_q * i_q
     torque = psi_d * i_q - psi_q * i_d
     dx[X.delta] = w_s * (x[X.omega] - 1.0)
     dx[X.omega] = (Pm / x[X.omega] - torque - p[P.D] * (x[X.omega] - 1.0)) / (2.0 * p[P.H])
-    dx[X.Eq_p] = (Efd - _field_current(x, p, i_d)) / p[P.Td0_p]
+    dx[X.Eq_p] = (Efd - field_current(x, p, i_d)) / p[P.Td0_p]
     dx[X.psi_kd] = (x[X.Eq_p] - x[X.psi_kd] - (p[P.xd_p] - p[P.xl]) * i_d) / p[P.Td0_pp]
     drop_q = i_q + (p[P.xq_p] - p[P.xq_pp]) / (span_q * span_q) * e_b
     dx[X.Ed_p] = (-x[X.Ed_p] - (p[P.xq] - p[P.xq_p]) * drop_q) / p[P.Tq0_p]
     dx[X.psi_kq] = e_b / p[P.Tq0_pp]
+
+
+def motion(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
+    """Write the derivatives of rotor and fluxes."""
+    move(x, u, p, dx)
+
+
+def at_rest(delta: Array, signals: dict[str, Array], p: Array) -> Array:
+    """Return the states (states, n) at rest, without saturation, and set E_fd, I_fd and P_m."""
+    v = signals["v_re"] + 1j * signals["v_im"]
+    i = signals["i_re"] + 1j * signals["i_im"]
+    to_dq = 1j * np.exp(-1j * delta)
+    i_d, i_q = (to_dq * i).real, (to_dq * i).imag
+    v_q = (to_dq * v).imag
+    x = np.zeros((len(STATES), len(delta)))
+    x[X.delta] = delta
+    x[X.omega] = 1.0
+    x[X.Eq_p] = v_q + p[P.ra] * i_q + p[P.xd_p] * i_d
+    x[X.psi_kd] = x[X.Eq_p] - (p[P.xd_p] - p[P.xl]) * i_d
+    x[X.Ed_p] = -(p[P.xq] - p[P.xq_p]) * i_q
+    x[X.psi_kq] = x[X.Ed_p] - (p[P.xq_p] - p[P.xl]) * i_q
+    signals["Efd"][:] = x[X.Eq_p] + (p[P.xd] - p[P.xd_p]) * i_d
+    signals["Ifd"][:] = signals["Efd"]
+    signals["Pm"][:] = (v * i.conj()).real + p[P.ra] * np.abs(i) ** 2
+    return x
 
 
 class Subtransient(Machine):
@@ -131,7 +159,7 @@ class Subtransient(Machine):
     example_source = "steam unit of the miniWECC (Trudnowski 2011), with a resistance added"
     norton = Equation(norton, (), ("Epp_re", "Epp_im", "omega", "delta"))
     equations = (
-        Equation(electrical, ("v_re", "v_im"), ("Pe", "Ifd")),
+        Equation(electrical, ("v_re", "v_im"), ("Pe", "Ifd", "i_re", "i_im")),
         Equation(motion, ("v_re", "v_im", "Efd", "Pm", "w_s"), ()),
     )
 
@@ -161,17 +189,4 @@ class Subtransient(Machine):
         """Return the states at rest, from terminal voltage and current (`i_re`, `i_im`)."""
         v = signals["v_re"] + 1j * signals["v_im"]
         i = signals["i_re"] + 1j * signals["i_im"]
-        delta = np.angle(v + (p[P.ra] + 1j * p[P.xq]) * i)
-        to_dq = 1j * np.exp(-1j * delta)
-        i_d, i_q = (to_dq * i).real, (to_dq * i).imag
-        v_q = (to_dq * v).imag
-        x = np.zeros((len(STATES), len(delta)))
-        x[X.delta] = delta
-        x[X.omega] = 1.0
-        x[X.Eq_p] = v_q + p[P.ra] * i_q + p[P.xd_p] * i_d
-        x[X.psi_kd] = x[X.Eq_p] - (p[P.xd_p] - p[P.xl]) * i_d
-        x[X.Ed_p] = -(p[P.xq] - p[P.xq_p]) * i_q
-        x[X.psi_kq] = x[X.Ed_p] - (p[P.xq_p] - p[P.xl]) * i_q
-        signals["Efd"][:] = x[X.Eq_p] + (p[P.xd] - p[P.xd_p]) * i_d
-        signals["Pm"][:] = (v * i.conj()).real + p[P.ra] * np.abs(i) ** 2
-        return x
+        return at_rest(np.angle(v + (p[P.ra] + 1j * p[P.xq]) * i), signals, p)
