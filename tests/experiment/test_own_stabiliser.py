@@ -1,17 +1,18 @@
 """The example of a stabiliser outside the package, from its file to its result."""
 
 import hashlib
-import importlib.util
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from conformance.test_linearisation import transfer
+from grid.stabiliser_runs import gain, respond, swing
 from scenarios.study import run
 from tieline.errors import InputError
 from tieline.experiment.load import load_experiment
 from tieline.experiment.plan import prepare
+from tieline.grid.models.pss.generalized_delta_omega import GeneralizedDeltaOmega
+from tieline.grid.models.registry import models, use_file
 
 FOLDER = Path(__file__).parents[2] / "examples" / "my_pss"
 EXPERIMENT = str(FOLDER / "experiment.yaml")
@@ -36,17 +37,19 @@ def test_the_run_knows_the_files_content_and_place() -> None:
     assert study.points[0].experiment.grid.pss.file == "my_pss.py"
 
 
-def test_the_examples_equations_are_its_declared_transfer_function() -> None:
-    """The example shows how to check one's own model; so it must pass itself."""
-    spec = importlib.util.spec_from_file_location("example_pss", FOLDER / "my_pss.py")
-    assert spec is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    model = module.SwingPSS
-    model.example = {"K": 9.0, "Tw": 10.0, "T1": 0.3, "T2": 0.03, "limit": 0.1}
-    s = 2j * np.pi * 0.4
-    for (name, got), declared in model.transfer(s, model.example, {}).items():
-        assert transfer(model, name, got, s) == pytest.approx(declared, rel=1e-6)
+def test_the_example_is_the_generalised_stabiliser_without_beta2() -> None:
+    """The example shows how to write equations; so they have to be right."""
+    use_file("pss", FOLDER / "my_pss.py")
+    own = models("pss")["swing_pss"]
+    values = {"K": 9.0, "Tw": 10.0, "T1": 0.3, "T2": 0.03, "limit": 0.1}
+    shipped = {**values, **dict.fromkeys(("T3", "T4", "T5", "T6"), 0.0)}
+    shipped |= {"vsmax": 0.1, "vsmin": -0.1, "beta1": 1.0, "beta2": 0.0}
+    np.testing.assert_array_equal(
+        respond(own, values, swing, 2.0), respond(GeneralizedDeltaOmega, shipped, swing, 2.0)
+    )
+    for name in ("omega", "wbar"):
+        assert gain(own, values, name, 0.4) == gain(GeneralizedDeltaOmega, shipped, name, 0.4)
+    use_file("pss", None)
 
 
 @pytest.mark.parametrize(
@@ -72,5 +75,5 @@ def test_a_slip_in_its_settings_is_refused_before_anything_starts(
 def test_without_its_file_the_model_is_unknown() -> None:
     """The file of one experiment must not leak into the next one of the same process."""
     prepare(load_experiment(EXPERIMENT))
-    with pytest.raises(InputError, match="grid.pss.model must be one of none, standard"):
+    with pytest.raises(InputError, match=r"grid\.pss\.model must be one of none, standard"):
         load_experiment("g26_trip_smoke", ["grid.pss.model=swing_pss"])

@@ -8,9 +8,9 @@ from pathlib import Path
 from tieline import yaml_lines
 from tieline.errors import InputError
 from tieline.experiment.overrides import Sources, apply, parse_settings, path_of, shortest
-from tieline.experiment.problems import checked, near
 from tieline.experiment.schema import Experiment
 from tieline.experiment.sweep import Point, expand, judge
+from tieline.problems import checked, near
 from tieline.resources import shipped
 
 _SETTING = re.compile(r"((?:grid|wams|network|case)(?:\.\w+|\[\d+\])*)(?=[\s:])")

@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from tieline.experiment.problems import Path, value_at
+from tieline.problems import Path, value_at
 from tieline.yaml_lines import Document
 
 

@@ -9,10 +9,10 @@ from typing import Any
 
 from tieline.errors import InputError
 from tieline.experiment.load import Study
-from tieline.experiment.problems import near
 from tieline.experiment.schema import Experiment
 from tieline.experiment.sites import Sites, Survey, survey
 from tieline.experiment.sweep import Point
+from tieline.problems import near
 from tieline.resources import case_folder, shipped
 
 

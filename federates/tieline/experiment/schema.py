@@ -6,9 +6,9 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, StrictInt
 
 from tieline.cosim.interfaces import FederationSettings
-from tieline.experiment.problems import Path, Problem
 from tieline.grid.settings import GridSettings
 from tieline.network.settings import NetworkSettings
+from tieline.problems import Path, Problem
 from tieline.wams.settings import WamsSettings
 
 CONTINUOUS_RATE_HZ = 60

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from tieline.experiment.overrides import Override, Sources, apply, path_of, related
-from tieline.experiment.problems import Path, checked
 from tieline.experiment.schema import FIXED, Experiment, contradictions, without_effect
+from tieline.problems import Path, checked
 
 
 @dataclass(frozen=True)

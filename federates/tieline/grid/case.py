@@ -67,13 +67,17 @@ class Branches:
 
 @dataclass(frozen=True)
 class Loads:
-    """Arrays (n,): bus index and the parts of its load that are not constant impedance."""
+    """Arrays (n,): bus index and the parts of its load that are not constant impedance.
+
+    `is_hvdc` marks the terminals of HVDC lines, which are no load.
+    """
 
     bus: Integers
     p_constant_power: Floats
     p_constant_current: Floats
     q_constant_power: Floats
     q_constant_current: Floats
+    is_hvdc: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -293,7 +297,8 @@ def _loads(table: Table, buses: Buses, places: _Places, findings: Findings) -> L
                 )
         if bus[at] != _NO_BUS and buses.p_load[bus[at]] == 0 == buses.q_load[bus[at]]:
             findings.add(row.where, f"bus {row.cells['bus']} has no load in bus.csv")
-    return Loads(bus, **shares)
+    is_hvdc = np.array([row.cells.get("kind", "load") == "hvdc" for row in rows], dtype=bool)
+    return Loads(bus, **shares, is_hvdc=is_hvdc)
 
 
 def _units(

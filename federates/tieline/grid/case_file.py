@@ -8,8 +8,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictFloat, 
 
 from tieline import yaml_lines
 from tieline.errors import InputError
-from tieline.experiment.problems import checked
 from tieline.grid.tables import Findings
+from tieline.problems import checked
 
 NAME = "case.yaml"
 

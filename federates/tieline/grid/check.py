@@ -9,6 +9,7 @@ from tieline.grid.case import Case
 from tieline.grid.devices import groups, with_pss
 from tieline.grid.events import plan_events
 from tieline.grid.initialise import initial_states
+from tieline.grid.load_mix import with_load_mix
 from tieline.grid.network import islands
 from tieline.grid.powerflow import solve_power_flow
 from tieline.grid.settings import GridSettings
@@ -50,13 +51,13 @@ def check(case: Case, grid: GridSettings, wams: WamsSettings) -> Sites:
 
     if not findings:
         attempt(lambda: _weigh(case, grid, wams))
-    fitted = attempt(lambda: with_pss(case, grid.pss))
+    fitted = attempt(lambda: with_pss(with_load_mix(case, grid.loads), grid.pss))
     parts = _parts(case)
     if parts:
         findings += parts
     else:
         attempt(lambda: _settle(fitted or case))
-        attempt(lambda: _plan(case, grid))
+        attempt(lambda: _plan(case, grid, sensor_buses(case, wams)))
     if findings:
         raise InputError(findings)
     assert fitted is not None
@@ -74,8 +75,8 @@ def _weigh(case: Case, grid: GridSettings, wams: WamsSettings) -> None:
         sensor_weights(case, sensor_buses(case, wams), wams.weights)
 
 
-def _plan(case: Case, grid: GridSettings) -> None:
-    plan_events(case, grid)
+def _plan(case: Case, grid: GridSettings, sensors: tuple[int, ...]) -> None:
+    plan_events(case, grid, sensors)
 
 
 def _unknown_sensors(case: Case, wams: WamsSettings) -> list[str]:

@@ -40,8 +40,9 @@ class Stage:
 
 @dataclass(frozen=True)
 class Disturbance:
-    """One event: its earliest tick, the condition that it waits for (or None), its stages."""
+    """One event: where it stands, its earliest tick, what it waits for (or None), its stages."""
 
+    where: str
     tick: int
     condition: Condition | None
     stages: tuple[Stage, ...]
@@ -78,7 +79,6 @@ class _Planner:
         self._case = case
         self._settings = settings
         self._sensors = sensors
-        self._where: dict[int, str] = {}
 
     def plan(self, where: str, event: Event) -> Disturbance:
         """Return an event's disturbance."""
@@ -96,15 +96,13 @@ class _Planner:
                 )
             except ValueError as error:
                 self.findings.append(f"{where}.when: {error}")
-        disturbance = Disturbance(tick, condition, tuple(self._stages(where, event)))
-        self._where[id(disturbance)] = where
-        return disturbance
+        return Disturbance(where, tick, condition, tuple(self._stages(where, event)))
 
     def check_branches(self, planned: list[Disturbance]) -> None:
         """Find branches that are opened while open or closed while closed, by time."""
         is_open: set[int] = set()
         timed = [
-            (item.tick + stage.after, self._where[id(item)], stage.change)
+            (item.tick + stage.after, item.where, stage.change)
             for item in planned
             if item.condition is None
             for stage in item.stages

@@ -15,6 +15,7 @@ from tieline.grid.case import Case, load_case
 from tieline.grid.check import sensor_buses
 from tieline.grid.devices import with_pss
 from tieline.grid.events import plan_events
+from tieline.grid.load_mix import with_load_mix
 from tieline.grid.models.registry import use_file
 from tieline.grid.plan import HELD, Average
 from tieline.grid.powerflow import solve_power_flow
@@ -57,7 +58,8 @@ class GridRun:
         settings = GridSettings.model_validate(run["grid"])
         wams = WamsSettings.model_validate(run["wams"])
         use_file("pss", settings.pss.file)
-        case = with_pss(load_case(Path(run["case"])), settings.pss)
+        case = with_load_mix(load_case(Path(run["case"])), settings.loads)
+        case = with_pss(case, settings.pss)
         fitted = [case.units.index(item["unit"]) for item in run["destinations"]]
         is_continuous = wams.reporting == "continuous"
         return cls(

@@ -3,7 +3,9 @@
     theta ->[ b s / (s^2 + a1 s + b) ]-> 2 pi (f - f0)
 
 Realised with z1' = z2 and z2' = b (theta - z1) - a1 z2, whose z2 is the output. As only
-theta - z1 enters, a small angle, wrapping it to (-pi, pi] unwraps the bus angle without memory.
+theta - z1 enters, wrapping it to (-pi, pi] unwraps the bus angle without memory, as long as it is
+smaller: z1 lags by a1/b = 0.1 s, so up to 4.8 Hz off nominal. Beyond, at the terminal of a unit
+that runs away alone, the estimate slips cycles and means nothing.
 Source: the miniWECC's frequency sensors (PSTess 1.1, by R. Elliott).
 """
 

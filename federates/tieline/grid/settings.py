@@ -1,8 +1,8 @@
 """What an experiment says about the grid."""
 
-from typing import Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, StrictInt
+from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, model_validator
 
 from tieline.grid.event_settings import Event
 from tieline.grid.pss_settings import PssSettings
@@ -11,6 +11,26 @@ from tieline.units import Seconds
 
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+Share = Annotated[StrictFloat, Field(ge=0, le=1)]
+
+
+class LoadSettings(_Strict):
+    """How every load answers to voltage, in place of the case's own mix; the rest is impedance."""
+
+    p_constant_power: Share = Field(0.0, description="share of active power that is constant power")
+    p_constant_current: Share = Field(0.0, description="share of it that is constant current")
+    q_constant_power: Share = Field(0.0, description="share of reactive power, constant power")
+    q_constant_current: Share = Field(0.0, description="share of it that is constant current")
+
+    @model_validator(mode="after")
+    def _leave_room(self) -> Self:
+        for letter in "pq":
+            parts = [getattr(self, f"{letter}_constant_{of}") for of in ("power", "current")]
+            if sum(parts) > 1:
+                raise ValueError(f"shares of {letter} must sum to 1 at most (got {parts})")
+        return self
 
 
 class GridSettings(_Strict):
@@ -23,4 +43,5 @@ class GridSettings(_Strict):
     )
     records_per_second: StrictInt = Field(60, gt=0, description="recorded instants a second")
     pss: PssSettings = PssSettings()  # type: ignore[call-arg]
+    loads: LoadSettings | None = Field(None, description="mix of every load; none keeps the case's")
     events: list[Event] = Field(default_factory=list, description="disturbances, in any order")

@@ -112,10 +112,17 @@ def _unknown(where: str, values: Mapping[str, float], used: list[type[Model]]) -
     known = list(dict.fromkeys(p.symbol for model in used for p in model.parameters))
     keys = " and ".join(model.key for model in used)
     return [
-        f"{where}: {keys} has no parameter '{symbol}'{near(symbol, known)} ({', '.join(known)})"
+        f"{where}: {keys} has no parameter '{symbol}'{_near(symbol, known)} ({', '.join(known)})"
         for symbol in values
         if used and symbol not in known
     ]
+
+
+def _near(symbol: str, known: list[str]) -> str:
+    """Return the hint at the nearest symbol; Tw for TW, which differs in half of its letters."""
+    of_lower = {word.lower(): word for word in known}
+    same = of_lower.get(symbol.lower())
+    return f"; did you mean '{same}'?" if same else near(symbol, known)
 
 
 def _missing(case: Case, fitted: list[Device]) -> list[str]:
