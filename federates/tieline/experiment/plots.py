@@ -208,17 +208,18 @@ def _mark_events(axes: Axes, run: Run) -> None:
 
 
 def _looks(runs: Sequence[Run]) -> list[dict[str, Any]]:
-    """Return colour and line of each run: a sequence for those with packets, black without."""
+    """Return colour and line of each run: a sequence, and black for those without packets.
+
+    Where no run has packets, all take part in the sequence.
+    """
     name, first, last = COLOURS
-    with_packets = [run for run in runs if len(_counts(run))]
-    places = np.linspace(first, last, max(2, len(with_packets)))
+    coloured = [bool(len(_counts(run))) for run in runs]
+    if not any(coloured):
+        coloured = [True] * len(runs)
+    places = np.linspace(first, last, max(2, sum(coloured)))
     colours = iter(mpl.colormaps[name](places))
-    return [
-        {"color": next(colours)}
-        if len(_counts(run))
-        else {"color": WITHOUT_PACKETS, "linestyle": (0, (4, 2)), "zorder": 3}
-        for run in runs
-    ]
+    ideal = {"color": WITHOUT_PACKETS, "linestyle": (0, (4, 2)), "zorder": 3}
+    return [{"color": next(colours)} if is_coloured else ideal for is_coloured in coloured]
 
 
 def _legend_title(runs: Sequence[Run]) -> str | None:
