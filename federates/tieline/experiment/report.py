@@ -29,6 +29,8 @@ def report(folder: Path, console: Console) -> None:
     plots = draw(folder / "plots", runs)
     console.print(closing_table(summaries))
     for summary in summaries:
+        if summary["ending"]:
+            _say(console, f"{summary['label']}: {summary['ending']}")
         if summary["swing"]["reason"]:
             _say(console, f"{summary['label']}: no swing read off: {summary['swing']['reason']}")
     if manifest["status"] != "complete":

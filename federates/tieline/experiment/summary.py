@@ -34,6 +34,7 @@ def summarise(run: Run) -> dict[str, Any]:
     told = run.told()
     return {
         "label": run.label,
+        "ending": run.ending(),
         "frequency": _frequency(run, grid, float(told["frequency_hz"])),
         "swing": _swing(run, grid, told.get("tie_mode")),
         "delay": _delay(run),
