@@ -15,6 +15,16 @@ REFUSALS = [
     (["grid.pss.units=[G1, G99]"], ["no unit 'G99'"]),
     (["wams.sensors=[2, 611]"], ["no bus 611 in case 'miniwecc'"]),
     (["wams.weights=[1, 2]"], ["wams.weights"]),
+    (["wams.weights=H", "wams.sensors=[2, 8]"], ["bus 8 has none"]),
+    (
+        [
+            "wams.weights=[1, 2]",
+            "grid.pss.average=rotors",
+            "wams.reporting=continuous",
+            "network.engine=ideal",
+        ],
+        ["one weight for each of the 34 units"],
+    ),
     (["network.mean_delay=1 ms"], ["network.mean_delay must be at least"]),
     (
         ["network.mean_delay=1 ms", "wams.sensors=[2, 611]", "grid.pss.units=[G1, G99]"],
