@@ -9,7 +9,11 @@ import pytest
 from tieline.cosim.interfaces import Clock, DeliveryBundle, FrameBundle
 from tieline.errors import CosimError, InputError, TimeContractBroken
 from tieline.network.federate import open_participant
+from tieline.resources import case_folder
 from tieline.tables import read_table, units_of
+from tieline.units import tick_ns
+
+MINIWECC = case_folder("miniwecc") / "network.yaml"
 
 TOPOLOGY = """\
 link_defaults: {rate: 1 Mbit/s, queue: 1, overhead: 9}
@@ -190,3 +194,41 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path):
         for run in (run_file(tmp_path), run_file(tmp_path))
     )
     assert first == again
+
+
+@pytest.mark.parametrize("processing", ["0 ms", "16.6 ms", "16.7 ms", "90 ms"])
+def test_looking_ahead_changes_no_byte(tmp_path: Path, processing: str) -> None:
+    """The network may work while the grid does only where no frame can matter yet."""
+    text = MINIWECC.read_text(encoding="utf-8")
+    assert "pmu: {processing: 88 ms" in text
+    topology = tmp_path / "network.yaml"
+    topology.write_text(text.replace("pmu: {processing: 88 ms", f"pmu: {{processing: {processing}"))
+    sent = []
+    for looks_ahead in (True, False):
+        folder = tmp_path / str(looks_ahead)
+        folder.mkdir()
+        participant = open_participant(miniwecc_run(topology), folder)
+        if not looks_ahead:
+            participant._look_ahead = lambda k: None  # type: ignore[method-assign]
+        bundles = []
+        for k in range(12):
+            payloads = np.full((3, 34), k, np.uint8)
+            frames = FrameBundle(tick_ns(k, 60), payloads)
+            bundles.append(participant.advance(k, frames.to_bytes()))
+        participant.finish()
+        sent.append((bundles, [read_table(path) for path in sorted(folder.glob("*.parquet"))]))
+    assert sent[0][0] == sent[1][0]
+    for one, other in zip(sent[0][1], sent[1][1], strict=True):
+        assert one.equals(other)
+
+
+def miniwecc_run(topology: Path) -> dict[str, Any]:
+    return {
+        "seed": 5,
+        "clock": {"rate_hz": 60, "intervals": 12},
+        "network": {"engine": "packet", "topology": str(topology), "loss": 0.02},
+        "sources": [{"name": f"pmu{i:02d}", "bus": bus} for i, bus in enumerate((2, 4, 61))],
+        "destinations": [
+            {"name": f"ctl{i:02d}", "unit": f"G{bus}", "bus": bus} for i, bus in enumerate((1, 118))
+        ],
+    }

@@ -93,9 +93,16 @@ class LinkUse:
 class Engine(Protocol):
     """A network that carries one packet of every frame to every destination.
 
-    Time only goes forward: frames are sent at or after the last `run_until`. However often
-    `run_until` is called on the way, the outcome is the same to the nanosecond.
+    Time only goes forward: a frame must be sent before `run_until` passes the instant at which it
+    can first enter the network, `lookahead_ns` after its measurement. However often `run_until` is
+    called on the way, and whenever frames are sent within that bound, the outcome is the same to
+    the nanosecond.
+
+    Attributes:
+        lookahead_ns: least time from a measurement until its frame does anything.
     """
+
+    lookahead_ns: int
 
     def send(self, measured_ns: int, sources: NDArray[np.int64], sequence: int) -> None:
         """Take the frames that some sources measured at one instant.

@@ -24,6 +24,8 @@ class ConstantDelay:
         delay_ns: the combined delay, 0 for ideal communication.
     """
 
+    lookahead_ns = 0
+
     def __init__(self, destinations: int, delay_ns: int) -> None:
         self._destinations = np.arange(destinations, dtype=np.int64)
         self._delay_ns = delay_ns

@@ -190,6 +190,11 @@ def least_delay_ns(spec: NetworkSpec, flow: Flow) -> int:
     return delay
 
 
+def leaves_after_ns(source: Source) -> int:
+    """Return the least time from a measurement until its frame leaves the PMU."""
+    return source.processing_ns + _least(source.jitter)
+
+
 def _mean(jitter: Jitter | None) -> float:
     return 0.0 if jitter is None else jitter.mean_ns
 

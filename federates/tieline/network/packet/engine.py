@@ -43,7 +43,7 @@ from tieline.network.packet.memory import (
     USED,
     WANTS_DRAWS,
 )
-from tieline.network.spec import NetworkSpec, Source
+from tieline.network.spec import NetworkSpec, Source, leaves_after_ns
 
 
 class PacketEngine:
@@ -73,6 +73,7 @@ class PacketEngine:
             [(flow.source, flow.destination) for flow in spec.flows], dtype=np.int64
         ).reshape(-1, 2)
         self._flows_of = np.bincount(self._flow_ends[:, 0], minlength=len(spec.sources))
+        self.lookahead_ns = min((leaves_after_ns(source) for source in spec.sources), default=0)
         self._now_ns = -1
         self._held = NO_ARRIVALS
         self._rows: list[NDArray[np.int64]] = []
@@ -84,9 +85,9 @@ class PacketEngine:
         """Take the frames that some sources measured at one instant.
 
         Raises:
-            CosimError: the instant is before the last `run_until`.
+            CosimError: the last `run_until` has passed the instant at which a frame may enter.
         """
-        if measured_ns < self._now_ns:
+        if measured_ns + self.lookahead_ns < self._now_ns:
             raise CosimError(
                 f"a frame measured at {measured_ns} ns came when the network had reached "
                 f"{self._now_ns} ns"
