@@ -1,14 +1,20 @@
 """Switches numba on or off for the whole package, so that one code runs compiled or as plain NumPy.
 
-Compiled code is cached beside its source (or in numba's user cache where that is read-only).
 `TIELINE_COMPILER=off` leaves every function as it is written. Fast-math stays off: results must
 not depend on how a compiler reorders sums.
+
+Compiled code is cached. numba renews a cached function when its own file changes, but not when a
+constant or a function that it took from another file does; so each state of the package's source
+has a cache folder of its own, in `$XDG_CACHE_HOME/tieline` unless NUMBA_CACHE_DIR names another.
 """
 
+import hashlib
 import os
+import shutil
 import warnings
 from collections.abc import Callable, Sequence
 from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
@@ -20,7 +26,34 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 # numba calls first-class functions experimental at each compilation that sees one.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
+CACHES_KEPT = 4
+"""Cache folders that stay, the newest first: those of other versions and checkouts."""
+
+
+def _use_own_cache() -> None:
+    """Point numba to the cache folder of this source; leave its default where none can be made."""
+    if "NUMBA_CACHE_DIR" in os.environ:
+        return
+    package = Path(__file__).resolve().parent
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        digest.update(path.relative_to(package).as_posix().encode() + path.read_bytes())
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tieline"
+    folder = home / digest.hexdigest()[:16]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        others = sorted(home.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
+    except OSError:
+        return
+    for old in others[CACHES_KEPT:]:
+        shutil.rmtree(old, ignore_errors=True)
+    numba.config.CACHE_DIR = str(folder)
+
+
 IS_ON = os.environ.get("TIELINE_COMPILER", "on") != "off"
+if IS_ON:
+    _use_own_cache()
 
 
 def compiled(function: Function) -> Function:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from grid.runs import G26_AT_100_MS, disturbed, speeds
 from tieline.grid.integrate import METHODS, late_average
 from tieline.grid.simulation import Grid
 from tieline.grid.system import System
@@ -27,6 +28,24 @@ def test_halving_the_step_shrinks_the_error_as_the_methods_order_says(
     errors = [np.abs(swing(system, method, rate) - exact).max() for rate in (coarse, fine)]
     # Asymptotically 2^order; the fastest state (0.02 s) is not far below these steps, so a quarter
     # of an order is allowed either way.
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.25)
+
+
+@pytest.mark.parametrize(
+    ("method", "coarse", "order"), [("heun", 480, 2), ("rk4", 240, 4), ("trapezoid", 240, 2)]
+)
+def test_an_event_in_mid_run_costs_no_order(
+    system: System, method: str, coarse: int, order: int
+) -> None:
+    """The trip of G26 at 0.1 s, seen at 0.3 s: a step that reached across it is of order 1."""
+    exact = disturbed(system, "rk4", 3840, G26_AT_100_MS)
+    exact.advance(1152)
+    errors = []
+    for rate in (coarse, 2 * coarse):
+        grid = disturbed(system, method, rate, G26_AT_100_MS)
+        grid.advance(rate * 3 // 10)
+        errors.append(np.abs(speeds(grid) - speeds(exact)).max())
+    # As for the smooth swing above.
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.25)
 
 

@@ -50,10 +50,17 @@ def solve_network(plan: Plan, work: Work) -> bool:
     solve(plan.factors, work.source, work.scratch, work.v_open)
     converged = settle(plan.loads, plan.load_transfer, work.v_open, work.v, work.source)
     solve(plan.factors, work.source, work.scratch, work.v)
+    show_voltages(plan, work)
+    return converged
+
+
+@compiled
+def show_voltages(plan: Plan, work: Work) -> None:
+    """Write the bus voltages of `work` as the signals of its units."""
+    signals = work.signals
     for i in range(len(plan.unit_bus)):
         v = work.v[plan.unit_bus[i]]
         signals[V_RE, i], signals[V_IM, i], signals[VT, i] = v.real, v.imag, abs(v)
-    return converged
 
 
 @compiled
@@ -87,3 +94,13 @@ def rhs(functions: Any, plan: Plan, work: Work, x: Floats, dx: Floats) -> bool:
     for place in plan.frozen:
         dx[place] = 0.0
     return solved
+
+
+@compiled
+def rhs_at_voltages(functions: Any, plan: Plan, work: Work, x: Floats, dx: Floats) -> None:
+    """Write dx/dt and every signal at `x`, with the voltages and wbar as they stand in `work`."""
+    for j in range(len(plan.jobs.function)):
+        run_job(functions, plan.jobs, work, j, x, dx)
+    filter_angles(plan.sensors, work.v, x, dx)
+    for place in plan.frozen:
+        dx[place] = 0.0

@@ -3,14 +3,16 @@
 Source: Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.1.
 """
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tieline.compiled import compiled
+from tieline.grid.anti_windup import stop_at_limit
 from tieline.grid.equations import WBAR, average_now, rhs
 from tieline.grid.plan import HELD, Plan, Work
+from tieline.grid.system import System
 
 Floats = NDArray[np.float64]
 
@@ -39,7 +41,13 @@ METHODS = {
     ),
 }
 
-DONE, NO_NETWORK_SOLUTION, NOT_FINITE = 0, 1, 2
+DONE, NO_NETWORK_SOLUTION, NOT_FINITE, NOT_CONVERGED = 0, 1, 2, 3
+
+AT_LIMIT = -1
+"""A state may have run past a non-windup limit in the step before."""
+
+MOVED = 1e-9
+"""Least motion in a step of a state that is taken to run into a limit."""
 
 HISTORY_MARGIN = 4
 """Instants that the history of a delayed average holds beyond its delay."""
@@ -69,6 +77,7 @@ def advance(
     work: Work,
     history: Floats,
     x: Floats,
+    before: Floats,
     k: Floats,
     tick: int,
     steps: int,
@@ -80,11 +89,11 @@ def advance(
     Args:
         functions, plan, work: the system.
         history: ring of past averages, indexed by tick; holds the delay and a margin.
-        x: states (n,); k: scratch (stages + 1, n).
+        x: states (n,); before: the same one step ago; k: scratch (stages + 1, n).
         tick, steps, h, method: where it starts, how far, step in s, tableau.
 
     Returns:
-        The tick reached and `DONE`, or the tick of the step that failed and why.
+        The tick reached and `DONE`, or the tick of the step that was not taken and why.
     """
     is_late = plan.average.mode != HELD and plan.average.delay_steps > 0
     stages = len(method.b)
@@ -100,6 +109,11 @@ def advance(
                 work.signals[WBAR] = late_average(history, now, delay, method.half[stage])
             if not rhs(functions, plan, work, at_stage, k[stage]):
                 return now, NO_NETWORK_SOLUTION
+            if stage == 0:
+                for i in range(len(x)):
+                    if k[0, i] == 0.0 and abs(x[i] - before[i]) > MOVED:
+                        return now, AT_LIMIT
+        before[:] = x
         for stage in range(stages):
             x += (h * method.b[stage]) * k[stage]
         if not np.isfinite(x).all():
@@ -107,3 +121,69 @@ def advance(
         if plan.average.mode != HELD:
             history[(now + 1) % len(history)] = average_now(plan.average, plan.sensors, x)
     return tick + steps, DONE
+
+
+class Integrator(Protocol):
+    """A method at work on one system in steps of one length; the way of stepping changes no bit."""
+
+    @property
+    def worst(self) -> int:
+        """Return the place of the state that kept a step from converging."""
+        ...
+
+    def advance(
+        self, plan: Plan, work: Work, history: Floats, x: Floats, tick: int, steps: int
+    ) -> tuple[int, int]:
+        """Integrate `x` in place over `steps` steps from `tick`.
+
+        Args:
+            plan, work: the system as it is now.
+            history: ring of past averages, indexed by tick; holds the delay and a margin.
+            x: states (n,).
+            tick, steps: where it starts and how far.
+
+        Returns:
+            The tick reached and `DONE`, or the tick of the step that failed and why.
+        """
+        ...
+
+
+class RungeKutta:
+    """An explicit method at work on one system, in steps of `h` seconds.
+
+    A state that has run past a non-windup limit in a step is put back on it before the next one
+    begins; what is looked at in between sees it beyond the limit, and the signal that it drives at
+    the limit.
+    """
+
+    def __init__(self, system: System, method: Tableau, h: float) -> None:
+        self._functions = system.functions
+        self._method = method
+        self._h = h
+        self._before = system.x0.copy()
+        self._k = np.zeros((len(method.b) + 1, len(system.x0)))
+
+    @property
+    def worst(self) -> int:
+        """Return 0: an explicit step has nothing to converge."""
+        return 0
+
+    def advance(
+        self, plan: Plan, work: Work, history: Floats, x: Floats, tick: int, steps: int
+    ) -> tuple[int, int]:
+        """Integrate `x` in place, as `Integrator` says."""
+        end, status = tick + steps, AT_LIMIT
+        while status == AT_LIMIT:
+            tick, status = advance(
+                self._functions, plan, work, history, x, self._before, self._k,
+                tick, end - tick, self._h, self._method,
+            )  # fmt: skip
+            if status == AT_LIMIT:
+                self._put_back(plan, work, x)
+        return tick, status
+
+    def _put_back(self, plan: Plan, work: Work, x: Floats) -> None:
+        stopped = (self._k[0] == 0.0) & (np.abs(x - self._before) > MOVED)
+        for i in np.flatnonzero(stopped).tolist():
+            stop_at_limit(self._functions, plan, work, x, i, self._before[i])
+        self._before[:] = x

@@ -37,7 +37,13 @@ class GridSettings(_Strict):
     """Duration, integration and disturbances."""
 
     duration: Seconds = Field(41.0, gt=0, le=86_400, description="simulated time, s")
-    method: Literal["rk4", "heun"] = Field("rk4", description="integration method")
+    method: Literal["rk4", "heun", "trapezoid"] = Field(
+        "rk4",
+        description=(
+            "integration method; trapezoid, the implicit one, stands stiff parameters and steps as "
+            "long as 1/60 s"
+        ),
+    )
     steps_per_second: StrictInt = Field(
         240, gt=0, le=100_000, description="integration steps a second"
     )

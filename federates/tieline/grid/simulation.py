@@ -15,11 +15,11 @@ from tieline.grid.events import Disturbance
 from tieline.grid.integrate import (
     DONE,
     HISTORY_MARGIN,
-    METHODS,
     NO_NETWORK_SOLUTION,
-    advance,
+    NOT_CONVERGED,
     late_average,
 )
+from tieline.grid.methods import integrator
 from tieline.grid.models.base import SIGNALS
 from tieline.grid.plan import HELD, Work
 from tieline.grid.sensors import frequencies
@@ -77,7 +77,7 @@ class Grid:
         self.is_live = np.ones(len(system.flow.v), dtype=bool)
         self.ending: Ending | None = None
         self.log: list[tuple[int, str]] = []
-        self._method = METHODS[method]
+        self._integrator = integrator(method, system, 1.0 / steps_per_second)
         self._plan = system.plan
         self._per_look = max(1, steps_per_second // LOOKS_PER_SECOND)
         self._agenda = Agenda(events)
@@ -85,7 +85,6 @@ class Grid:
         self._work = _copy(system.work)
         self._view = _copy(system.work)
         self._x = system.x0.copy()
-        self._k = np.zeros((len(self._method.b) + 1, len(self._x)))
         self._dx = np.zeros(len(self._x))
         self._history = np.ones(self._plan.average.delay_steps + HISTORY_MARGIN)
         self._inertia = system.case.unit_MVA * inertia(system.case)
@@ -122,21 +121,23 @@ class Grid:
 
     def _run(self, to_tick: int) -> None:
         self._is_current = False
-        reached, status = advance(
-            self.system.functions,
+        reached, status = self._integrator.advance(
             self._plan,
             self._work,
             self._history,
             self._x,
-            self._k,
             self.tick,
             to_tick - self.tick,
-            1.0 / self.steps_per_second,
-            self._method,
         )
         self.tick = reached
         if status == NO_NETWORK_SOLUTION and np.isfinite(self._x).all():
             self._end(Ending(reached, f"voltage collapse: {self._failure(self._work)}"))
+        elif status == NOT_CONVERGED:
+            worst = self.system.labels[self._integrator.worst]
+            raise NumericalError(
+                f"the step from t = {reached / self.steps_per_second:.4f} s did not converge, "
+                f"{worst} least of all; try more steps a second"
+            )
         elif status != DONE:
             raise NumericalError(self._failure(self._work))
 
