@@ -57,10 +57,13 @@ if IS_ON:
 
 
 def compiled(function: Function) -> Function:
-    """Return `function` compiled on first call and cached; unchanged with the compiler off."""
+    """Return `function` compiled on first call and cached; unchanged with the compiler off.
+
+    It runs without the interpreter's lock, so that both federates of one process work at once.
+    """
     if not IS_ON:
         return function
-    return numba.njit(cache=True, error_model="numpy")(function)
+    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)
 
 
 def first_class(functions: Sequence[Callable[..., None]], signature: Any) -> Any:

@@ -1,5 +1,6 @@
 """The time loop: who is granted when, what is sent with which stamp, and what must have come."""
 
+from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
@@ -16,8 +17,11 @@ class Link(Protocol):
 
     limit_bytes: int | None
 
-    def request(self, at_ns: int) -> int:
-        """Return the instant granted for a request of `at_ns`."""
+    def ask(self, at_ns: int) -> None:
+        """Request an instant."""
+
+    def granted(self) -> int:
+        """Return the instant granted for the last request, once it is."""
 
     def send(self, data: bytes, at_ns: int) -> None:
         """Send a message that the peer gets once it is granted `at_ns` or later."""
@@ -39,8 +43,9 @@ class Observer(Protocol):
 class Exchange:
     """One federate's side of the contract: numbered bundles, checked stamps, counted streams.
 
-    The network is granted t_k + 1 us and sends its bundle then; the grid is granted t_k + 2 us
-    and stamps its bundle t_k+1, where HELICS holds it until the network's next grant.
+    The federates meet at the first instant t_k of each of the clock's windows. The network is
+    granted t_k + 1 us and sends its bundles then; the grid is granted t_k + 2 us and stamps its
+    bundles with the next meeting's instant, to which HELICS holds them.
     """
 
     def __init__(
@@ -58,8 +63,12 @@ class Exchange:
         self.sent = Ledger()
         self.received = Ledger()
 
+    def ask(self, k: int) -> None:
+        """Request the grant of the meeting at t_k; the peer may then go on."""
+        self._link.ask(self._clock.at_ns(k) + LAG_NS[self._name])
+
     def meet(self, k: int) -> None:
-        """Wait for the grant of interval `k`.
+        """Wait for the grant of the meeting at t_k, which was asked for.
 
         Raises:
             TimeContractBroken: another time was granted than asked for.
@@ -67,7 +76,7 @@ class Exchange:
         asked_ns = self._clock.at_ns(k) + LAG_NS[self._name]
         if self._observer is not None:
             self._observer.wait()
-        granted_ns = self._link.request(asked_ns)
+        granted_ns = self._link.granted()
         if granted_ns != asked_ns:
             raise TimeContractBroken(
                 f"{self._name} asked for {ns_to_seconds(asked_ns):.9f} s "
@@ -77,10 +86,10 @@ class Exchange:
         if self._observer is not None:
             self._observer.grant(k, granted_ns)
 
-    def send(self, k: int, payload: bytes) -> None:
-        """Send bundle `k`: the grid's is stamped t_k, the network's with its grant."""
+    def send(self, k: int, payload: bytes, meeting: int) -> None:
+        """Send bundle `k` so that the peer has it at the meeting at t_`meeting`."""
         self.sent.add(payload)
-        self._send(Kind.BUNDLE, k, payload, self._stamp_ns(self._name, k))
+        self._send(Kind.BUNDLE, k, payload, self._stamp_ns(self._name, meeting))
 
     def receive(self, k: int) -> bytes:
         """Return the peer's bundle `k`.
@@ -116,14 +125,16 @@ class Exchange:
         for message in split(kind, k, payload, self._link.limit_bytes):
             self._link.send(message, at_ns)
 
-    def _collect(self, k: int) -> None:
-        expected_ns = self._stamp_ns(PEER[self._name], k)
+    def _collect(self, meeting: int) -> None:
+        expected_ns = self._stamp_ns(PEER[self._name], meeting)
+        due = _bundles_due(self._name, meeting, self._clock)
         for stamp_ns, data in self._link.receive():
             part = read_part(data)
-            if stamp_ns != expected_ns or part.k != k:
+            if stamp_ns != expected_ns or part.k not in due:
                 raise TimeContractBroken(
-                    f"{self._name} in interval {k}: {PEER[self._name]}'s {part.kind.name.lower()} "
-                    f"{part.k} came stamped {stamp_ns} ns, the contract says {expected_ns} ns"
+                    f"{self._name} in interval {meeting}: {PEER[self._name]}'s "
+                    f"{part.kind.name.lower()} {part.k} came stamped {stamp_ns} ns, "
+                    f"the contract says {_shown(due)} at {expected_ns} ns"
                 )
             self._arrived.setdefault((part.kind, part.k), []).append(part)
 
@@ -135,13 +146,31 @@ class Exchange:
         return join(parts)
 
 
+def _bundles_due(name: str, meeting: int, clock: Clock) -> range:
+    """Return the numbers of the peer's bundles, or of its end, that come to the meeting at t_k."""
+    if name == NETWORK:
+        since = 0 if meeting == 0 else (meeting - 1) // clock.stride * clock.stride + 1
+        return range(since, meeting + 1)
+    if meeting == clock.intervals:
+        return range(meeting, meeting + 1)
+    return range(meeting, min(meeting + clock.stride, clock.intervals))
+
+
+def _shown(numbers: range) -> str:
+    return f"{numbers[0]}" if len(numbers) == 1 else f"{numbers[0]} to {numbers[-1]}"
+
+
 def run_grid(grid: Participant, exchange: Exchange, clock: Clock) -> None:
     """Take the grid through every interval, up to the checked end marker."""
-    exchange.send(0, grid.start())
-    for k in range(clock.intervals):
-        exchange.meet(k)
-        exchange.send(k + 1, grid.advance(k, exchange.receive(k)))
+    [frames] = grid.start()
+    exchange.send(0, frames, 0)
+    for first, last in clock.windows():
+        exchange.ask(first)
+        exchange.meet(first)
+        for k in range(first, last):
+            exchange.send(k + 1, grid.advance(k, exchange.receive(k)), last)
     exchange.send_end()
+    exchange.ask(clock.intervals)
     exchange.meet(clock.intervals)
     exchange.check_end()
 
@@ -149,30 +178,47 @@ def run_grid(grid: Participant, exchange: Exchange, clock: Clock) -> None:
 def run_network(network: Participant, exchange: Exchange, clock: Clock) -> None:
     """Take the network through every interval, up to the checked end marker.
 
+    With a lead it asks for the next meeting as soon as it has sent, so that the grid can go on, and
+    then works out what it will hand over there.
+
     Raises:
-        CosimError: the network has something to say before it was given a frame.
+        CosimError: the network's first deliveries are not as many as its lead.
     """
-    check_silent(network.start())
-    for k in range(clock.intervals):
-        exchange.meet(k)
-        exchange.send(k, network.advance(k, exchange.receive(k)))
+    ready = first_deliveries(network, clock)
+    taken = 0
+    exchange.ask(0)
+    for first, last in clock.windows():
+        exchange.meet(first)
+        if not clock.lead:
+            ready.append(network.advance(first, exchange.receive(first)))
+        for k in range(first, last):
+            exchange.send(k, ready.popleft(), first)
+        exchange.ask(last)
+        if clock.lead:
+            for k in range(taken, first + 1):
+                ready.append(network.advance(k, exchange.receive(k)))
+        taken = first + 1
     exchange.meet(clock.intervals)
+    for k in range(taken, clock.intervals):
+        network.advance(k, exchange.receive(k))
     # The frames measured at the last instant reach nobody, but they count in the stream.
     exchange.receive(clock.intervals)
     exchange.check_end()
     exchange.send_end()
 
 
-def check_silent(message: bytes) -> None:
-    """Refuse a network that sends something before t_0.
+def first_deliveries(network: Participant, clock: Clock) -> deque[bytes]:
+    """Return the deliveries that a network can tell before it was given a frame.
 
     Raises:
-        CosimError: the message is not empty.
+        CosimError: they are not those of the clock's lead.
     """
-    if message:
+    first = deque(network.start())
+    if len(first) != clock.lead:
         raise CosimError(
-            f"the network's message before t_0 must be empty (got {len(message)} bytes)"
+            f"the network's lead is {clock.lead} intervals, but it began with {len(first)} messages"
         )
+    return first
 
 
 SIDES: dict[str, Callable[[Participant, Exchange, Clock], None]] = {

@@ -28,8 +28,8 @@ class GuardedParticipant:
         self._stop: str | None = None
         self._is_over = False
 
-    def start(self) -> bytes:
-        """Return the participant's first message."""
+    def start(self) -> list[bytes]:
+        """Return the participant's first messages."""
         return self._call(self._participant.start)
 
     def advance(self, k: int, received: bytes) -> bytes:

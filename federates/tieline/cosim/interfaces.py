@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from tieline.errors import CosimError
-from tieline.units import Seconds, tick_ns
+from tieline.units import NS_PER_S, Seconds, tick_ns
 
 GRID = "grid"
 NETWORK = "network"
 FEDERATES = (GRID, NETWORK)
 ENDPOINTS = {GRID: "grid/bundle", NETWORK: "network/bundle"}
 LAG_NS = {NETWORK: 1_000, GRID: 2_000}
-"""How long after t_k a federate is granted: the network first, then the grid that waits for it."""
+"""When each federate is granted after t_k: the network first, then the grid that waits for it."""
 
 DELIVERY = np.dtype(
     [
@@ -55,16 +55,56 @@ class FederationSettings(BaseModel):
     )
 
 
+MOST_PER_MEETING = 10
+"""Intervals between two meetings at most, however late frames come: a run must show that it goes
+on."""
+
+
 @dataclass(frozen=True)
 class Clock:
-    """The instants t_k = k / rate at which the federates meet, as whole nanoseconds."""
+    """The reporting intervals [t_k, t_k+1] of a run, t_k = k / rate, in whole nanoseconds.
+
+    Attributes:
+        rate_hz: intervals a second.
+        intervals: how many there are.
+        lead: by how many intervals the network is ahead: what arrives in [t_k, t_k+1] depends on
+            the frames measured up to t_(k - lead) alone. With a lead the federates work at once.
+    """
 
     rate_hz: int
     intervals: int
+    lead: int = 0
+
+    @property
+    def stride(self) -> int:
+        """Return the intervals between two meetings.
+
+        At a meeting the network hands over all that arrives before the next one, worked out while
+        the grid was at work on the stride before; so it must lead by all but one of two strides.
+        """
+        return (self.lead + 1) // 2 or 1
 
     def at_ns(self, k: int) -> int:
         """Return t_k."""
         return tick_ns(k, self.rate_hz)
+
+    def windows(self) -> list[tuple[int, int]]:
+        """Return (first, one past the last) interval between each meeting and the next."""
+        starts = range(0, self.intervals, self.stride)
+        return [(first, min(first + self.stride, self.intervals)) for first in starts]
+
+
+def lead_of(rate_hz: int, lookahead_ns: int | None) -> int:
+    """Return the `Clock.lead` of a network in which no frame does anything for `lookahead_ns`.
+
+    Then the frames of t_(k+1) do not matter before t_(k+lead+1); one nanosecond is spared because
+    instants are rounded to whole ones. Without frames (None) the lead is as long as is allowed.
+    """
+    most = 2 * MOST_PER_MEETING - 1
+    if lookahead_ns is None:
+        return most
+    longest = ((lookahead_ns - 1) * rate_hz - 1) // NS_PER_S
+    return max(0, min(most, longest - (longest + 1) % 2))
 
 
 class Participant(Protocol):
@@ -72,11 +112,19 @@ class Participant(Protocol):
 
     name: str
 
-    def start(self) -> bytes:
-        """Return the message that the other federate holds at t_0."""
+    def start(self) -> list[bytes]:
+        """Return the messages that the other federate needs before any went the other way.
+
+        They are the grid's frames of t_0, and the network's deliveries of its first `Clock.lead`
+        intervals.
+        """
 
     def advance(self, k: int, received: bytes) -> bytes:
-        """Return the message for the other federate after [t_k, t_k+1], given what came for it."""
+        """Return one more message for the other federate, given one that came from it.
+
+        The grid is given the deliveries of [t_k, t_k+1], and returns the frames of t_k+1. The
+        network is given the frames of t_k, and returns the deliveries of interval k + `Clock.lead`.
+        """
 
     def finish(self) -> None:
         """Write what is left to write; the federation has reached its end."""

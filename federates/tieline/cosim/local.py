@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from tieline.cosim.exchange import check_silent
+from tieline.cosim.exchange import first_deliveries
 from tieline.cosim.interfaces import GRID, LAG_NS, NETWORK, Clock, Participant
 
 
@@ -37,15 +37,15 @@ def _run(
     clock: Clock,
     progress: Callable[[str, int, int], None] | None,
 ) -> None:
-    frames = grid.start()
-    check_silent(network.start())
+    [frames] = grid.start()
+    deliveries = first_deliveries(network, clock)
     for k in range(clock.intervals):
         if progress is not None:
             progress(NETWORK, k, clock.at_ns(k) + LAG_NS[NETWORK])
-        deliveries = network.advance(k, frames)
+        deliveries.append(network.advance(k, frames))
         if progress is not None:
             progress(GRID, k, clock.at_ns(k) + LAG_NS[GRID])
-        frames = grid.advance(k, deliveries)
+        frames = grid.advance(k, deliveries.popleft())
     if progress is not None:
         for name in (NETWORK, GRID):
             progress(name, clock.intervals, clock.at_ns(clock.intervals) + LAG_NS[name])

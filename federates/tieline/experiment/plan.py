@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tieline.cosim.interfaces import lead_of
 from tieline.errors import InputError
 from tieline.experiment.load import Study
 from tieline.experiment.schema import Experiment
@@ -100,7 +101,11 @@ def _run_file(point: Point, sites: Sites, folder: Path, topology: Path | None) -
         "run_id": "-".join(filter(None, (experiment.name, point.slug, digest[:8]))),
         "config_hash": digest,
         "seed": experiment.seed,
-        "clock": {"rate_hz": experiment.rate_hz, "intervals": experiment.intervals},
+        "clock": {
+            "rate_hz": experiment.rate_hz,
+            "intervals": experiment.intervals,
+            "lead": lead_of(experiment.rate_hz, sites.lookahead_ns),
+        },
         "federation": settings["federation"],
         "case": str(folder),
         "grid": settings["grid"],

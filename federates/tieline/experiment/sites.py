@@ -1,7 +1,7 @@
 """Asks case and network whether an experiment can run, and which sites take part in it."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,8 @@ class Sites:
         frequency_hz: nominal frequency.
         tie_mode: the swing that the summary reports, as case.yaml has it, or None.
         plot_unit: the unit whose voltage is drawn, or None.
+        lookahead_ns: least time from a measurement until its frame does anything; None without
+            frames.
     """
 
     sensors: tuple[int, ...]
@@ -29,6 +31,7 @@ class Sites:
     frequency_hz: float = 60.0
     tie_mode: Mapping[str, Any] | None = None
     plot_unit: str | None = None
+    lookahead_ns: int | None = 0
 
     def sources(self) -> list[dict[str, Any]]:
         """Return the PMUs as the run file lists them."""
@@ -64,7 +67,7 @@ def survey(experiment: Experiment, folder: Path, topology: Path | None) -> Sites
     # The case brings the compiled models with it, which `tieline list` should not wait for.
     from tieline.grid.case import load_case
     from tieline.grid.models.registry import use_file
-    from tieline.network.topology import check_topology
+    from tieline.network.topology import network_spec
 
     use_file("pss", experiment.grid.pss.file)
     case = load_case(folder)
@@ -77,14 +80,18 @@ def survey(experiment: Experiment, folder: Path, topology: Path | None) -> Sites
         None if tie_mode is None else tie_mode.model_dump(mode="json"),
         case.base.plot_unit,
     )
-    if topology is not None and sensors and controllers:
+    lookahead_ns = None
+    if sensors and controllers:
+        sources, destinations = sites.sources(), sites.destinations()
         try:
-            check_topology(topology, sites.sources(), sites.destinations(), experiment.network)
+            spec = network_spec(experiment.network, topology, sources, destinations)
+            lookahead_ns = spec.lookahead_ns
         except InputError as error:
             findings += error.findings
     if findings:
         raise InputError(findings)
-    return sites
+    has_frames = experiment.wams.reporting != "continuous"
+    return replace(sites, lookahead_ns=lookahead_ns if has_frames else None)
 
 
 def _stations(

@@ -113,9 +113,9 @@ class GridFederate:
         is_fitted[run.fitted] = 1.0
         self._recorder = Recorder(folder / "grid.parquet", self._grid, sensors, is_fitted)
 
-    def start(self) -> bytes:
+    def start(self) -> list[bytes]:
         """Return the frames measured at t_0."""
-        return self._frames(0)
+        return [self._frames(0)]
 
     def advance(self, k: int, received: bytes) -> bytes:
         """Integrate [t_k, t_k+1], each delivery at its step boundary; return the frames of t_k+1.

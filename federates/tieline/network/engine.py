@@ -127,6 +127,15 @@ class Engine(Protocol):
         """Return what each link carried, direction by direction; none without a topology."""
 
 
+def check_not_late(enters_ns: int, now_ns: int) -> None:
+    """Raise CosimError unless a frame can still do what it does first, at `enters_ns`."""
+    if enters_ns < now_ns:
+        raise CosimError(
+            f"a frame that does something at {enters_ns} ns came when the network had reached "
+            f"{now_ns} ns"
+        )
+
+
 def in_order(arrivals: NDArray[np.void]) -> NDArray[np.void]:
     """Return arrivals in the total order (arrival_ns, source, sequence, destination)."""
     times_ns = arrivals["arrival_ns"]

@@ -1,6 +1,5 @@
 """The network as a participant of the federation: frames in, deliveries out, once an interval."""
 
-from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -8,16 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tieline.cosim.interfaces import DELIVERY, NETWORK, Clock, DeliveryBundle, FrameBundle
-from tieline.errors import CosimError, InputError, TimeContractBroken
+from tieline.errors import CosimError, TimeContractBroken
 from tieline.network.engine import Engine, Outcome
 from tieline.network.ideal import ConstantDelay
 from tieline.network.packet import PacketEngine
 from tieline.network.results import PacketLog, write_delays, write_flows, write_links
 from tieline.network.settings import NetworkSettings
-from tieline.network.spec import FRAME_BYTES, NetworkSpec, direct_spec, least_delay_ns
+from tieline.network.spec import FRAME_BYTES, NetworkSpec, least_delay_ns
 from tieline.network.stats import FlowStatistics
-from tieline.network.topology import read_topology
-from tieline.units import NS_PER_S, seconds_to_ns
+from tieline.network.topology import network_spec
+from tieline.units import NS_PER_S
 
 
 def open_participant(run: dict[str, Any], folder: Path) -> "NetworkParticipant":
@@ -28,24 +27,15 @@ def open_participant(run: dict[str, Any], folder: Path) -> "NetworkParticipant":
     """
     stated = run["network"]
     settings = NetworkSettings.model_validate({**stated, "topology": stated["topology"] or "case"})
-    sources, destinations = run["sources"], run["destinations"]
+    is_packet = settings.engine == "packet"
+    topology = Path(settings.topology) if is_packet else None
+    spec = network_spec(settings, topology, run["sources"], run["destinations"])
     engine: Engine
-    if settings.engine == "packet":
-        spec = read_topology(Path(settings.topology), sources, destinations, settings)
+    if is_packet:
         engine = PacketEngine(spec, run["seed"])
     else:
-        delay_ns = _delay_ns(settings)
-        spec = direct_spec(sources, destinations, delay_ns)
-        engine = ConstantDelay(len(destinations), delay_ns)
+        engine = ConstantDelay(len(spec.destinations), spec.lookahead_ns)
     return NetworkParticipant(Clock(**run["clock"]), spec, engine, folder, settings.record_packets)
-
-
-def _delay_ns(settings: NetworkSettings) -> int:
-    if settings.engine == "ideal":
-        return 0
-    if settings.delay is None:
-        raise InputError("network.delay must be given with network.engine constant")
-    return seconds_to_ns(settings.delay)
 
 
 class NetworkParticipant:
@@ -74,60 +64,45 @@ class NetworkParticipant:
         self._log = PacketLog(folder / "packets.parquet", flow_of) if record_packets else None
         self._frames = _FrameStore(len(spec.destinations))
         self._until_ns = 0
-        self._worker = ThreadPoolExecutor(max_workers=1)
-        self._ahead: Future[bytes] | None = None
 
-    def start(self) -> bytes:
-        """Return nothing: no frame has been sent yet."""
-        return b""
+    def start(self) -> list[bytes]:
+        """Return the deliveries of the first intervals, in which no frame can matter."""
+        return [self._carry(k) for k in range(self._clock.lead)]
 
     def advance(self, k: int, received: bytes) -> bytes:
-        """Return the deliveries up to t_k+1, given the frames measured at t_k.
+        """Return the deliveries of interval k + lead, given the frames measured at t_k.
 
         Raises:
             TimeContractBroken: the frames were measured at another instant.
             CosimError: the message is no frame bundle, it does not have one frame of the right
-                size for each source (or none at all), or packets are not accounted for.
+                size for each source (or none at all), it comes too late for its frames to enter
+                the network in time, or packets are not accounted for.
         """
         bundle = FrameBundle.from_bytes(received)
         self._check(k, bundle)
-        ahead = None if self._ahead is None else self._ahead.result()
         sources = np.arange(len(bundle.payloads))
         if len(sources):
             self._engine.send(bundle.measured_ns, sources, k)
             self._statistics.add_sent(sources)
             self._frames.keep(k, bundle.payloads)
-        deliveries = self._carry(k) if ahead is None else ahead
-        self._look_ahead(k + 1)
-        return deliveries
+        return self._carry(k + self._clock.lead)
 
     def finish(self) -> None:
         """Write the tables."""
-        self._worker.shutdown()
         self._write()
 
     def abort(self, reason: str) -> None:
         """Write the tables as far as the run came."""
-        self._worker.shutdown()
         self._write()
 
     def _carry(self, k: int) -> bytes:
-        """Run the network over [t_k, t_k+1] and return its deliveries."""
+        """Run the network over [t_k, t_k+1] and return its deliveries; nothing after the end."""
+        if k >= self._clock.intervals:
+            return b""
         self._until_ns = self._clock.at_ns(k + 1)
         outcome = self._engine.run_until(self._until_ns)
         self._record(outcome)
         return self._bundle(outcome).to_bytes()
-
-    def _look_ahead(self, k: int) -> None:
-        """Carry interval `k` while the grid is at work, if no frame of t_k can matter in it.
-
-        The frames of t_k cannot enter the network before t_k + lookahead. Where that is after
-        t_k+1, the interval's deliveries are known before its frames are, to the last bit.
-        """
-        self._ahead = None
-        is_known = self._clock.at_ns(k) + self._engine.lookahead_ns > self._clock.at_ns(k + 1)
-        if is_known and k < self._clock.intervals:
-            self._ahead = self._worker.submit(self._carry, k)
 
     def _check(self, k: int, bundle: FrameBundle) -> None:
         expected_ns = self._clock.at_ns(k)

@@ -12,6 +12,7 @@ from tieline.network.engine import (
     Counts,
     LinkUse,
     Outcome,
+    check_not_late,
     in_order,
 )
 
@@ -24,17 +25,22 @@ class ConstantDelay:
         delay_ns: the combined delay, 0 for ideal communication.
     """
 
-    lookahead_ns = 0
-
     def __init__(self, destinations: int, delay_ns: int) -> None:
+        self.lookahead_ns = delay_ns
         self._destinations = np.arange(destinations, dtype=np.int64)
         self._delay_ns = delay_ns
         self._waiting: deque[NDArray[np.void]] = deque()
+        self._now_ns = -1
         self._sent = 0
         self._delivered = 0
 
     def send(self, measured_ns: int, sources: NDArray[np.int64], sequence: int) -> None:
-        """Take the frames of one instant."""
+        """Take the frames of one instant.
+
+        Raises:
+            CosimError: the last `run_until` has passed the instant at which they arrive.
+        """
+        check_not_late(measured_ns + self.lookahead_ns, self._now_ns)
         frames = np.empty(len(sources) * len(self._destinations), ARRIVAL)
         frames["arrival_ns"] = measured_ns + self._delay_ns
         frames["source"] = np.repeat(sources, len(self._destinations))
@@ -50,6 +56,7 @@ class ConstantDelay:
         Raises:
             CosimError: packets are not all accounted for.
         """
+        self._now_ns = until_ns
         due = []
         while self._waiting and self._waiting[0]["arrival_ns"][0] <= until_ns:
             due.append(self._waiting.popleft())

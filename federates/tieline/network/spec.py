@@ -132,6 +132,12 @@ class NetworkSpec:
             numbers[link.b, link.a] = 2 * index + 1
         return numbers
 
+    @cached_property
+    def lookahead_ns(self) -> int:
+        """The least time from a measurement until its frame leaves the PMU, of all sources."""
+        leaves = (source.processing_ns + _least(source.jitter) for source in self.sources)
+        return min(leaves, default=0)
+
     def hops(self, route: Route) -> list[tuple[int, Link]]:
         """Return the port and the link of each hop of a route."""
         numbers = [self.ports[pair] for pair in pairwise(route)]
@@ -188,11 +194,6 @@ def least_delay_ns(spec: NetworkSpec, flow: Flow) -> int:
     for _, link in spec.hops(flow.route):
         delay += service_ns(link, FRAME_BYTES) + link.propagation_ns + _least(link.jitter)
     return delay
-
-
-def leaves_after_ns(source: Source) -> int:
-    """Return the least time from a measurement until its frame leaves the PMU."""
-    return source.processing_ns + _least(source.jitter)
 
 
 def _mean(jitter: Jitter | None) -> float:

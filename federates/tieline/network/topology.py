@@ -14,6 +14,7 @@ from tieline.network.spec import (
     NetworkSpec,
     Route,
     Source,
+    direct_spec,
     unloaded_delay_ns,
 )
 from tieline.units import ns_to_seconds, seconds_to_ns
@@ -43,15 +44,26 @@ def read_topology(
     return lengthened(_resolved(entries, settings.cross_traffic), settings, path)
 
 
-def check_topology(
-    path: Path, sources: Sites, destinations: Sites, settings: NetworkSettings
-) -> None:
-    """Refuse a topology file that `read_topology` would refuse; nothing is started or written.
+def network_spec(
+    settings: NetworkSettings, topology: Path | None, sources: Sites, destinations: Sites
+) -> NetworkSpec:
+    """Return the network of an experiment, whatever its engine; nothing is started or written.
+
+    Args:
+        settings: engine, and what it needs.
+        topology: the file of the packet engine's network; None for the other engines.
+        sources: the PMUs, as for `read_topology`.
+        destinations: the controllers, as for `read_topology`.
 
     Raises:
-        InputError: as `read_topology`.
+        InputError: as `read_topology`, or the constant engine has no delay.
     """
-    read_topology(path, sources, destinations, settings)
+    if topology is not None:
+        return read_topology(topology, sources, destinations, settings)
+    if settings.engine == "constant" and settings.delay is None:
+        raise InputError("network.delay must be given with network.engine constant")
+    delay_s = settings.delay if settings.engine == "constant" else None
+    return direct_spec(sources, destinations, seconds_to_ns(delay_s or 0.0))
 
 
 def mean_unloaded_delay_ns(spec: NetworkSpec) -> float:

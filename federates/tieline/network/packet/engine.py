@@ -14,6 +14,7 @@ from tieline.network.engine import (
     Counts,
     LinkUse,
     Outcome,
+    check_not_late,
     in_order,
 )
 from tieline.network.packet import kernel
@@ -43,7 +44,7 @@ from tieline.network.packet.memory import (
     USED,
     WANTS_DRAWS,
 )
-from tieline.network.spec import NetworkSpec, Source, leaves_after_ns
+from tieline.network.spec import NetworkSpec, Source
 
 
 class PacketEngine:
@@ -73,7 +74,7 @@ class PacketEngine:
             [(flow.source, flow.destination) for flow in spec.flows], dtype=np.int64
         ).reshape(-1, 2)
         self._flows_of = np.bincount(self._flow_ends[:, 0], minlength=len(spec.sources))
-        self.lookahead_ns = min((leaves_after_ns(source) for source in spec.sources), default=0)
+        self.lookahead_ns = spec.lookahead_ns
         self._now_ns = -1
         self._held = NO_ARRIVALS
         self._rows: list[NDArray[np.int64]] = []
@@ -87,11 +88,7 @@ class PacketEngine:
         Raises:
             CosimError: the last `run_until` has passed the instant at which a frame may enter.
         """
-        if measured_ns + self.lookahead_ns < self._now_ns:
-            raise CosimError(
-                f"a frame measured at {measured_ns} ns came when the network had reached "
-                f"{self._now_ns} ns"
-            )
+        check_not_late(measured_ns + self.lookahead_ns, self._now_ns)
         ready = [self._pmus[source].ready_ns(measured_ns) for source in sources]
         items = -1 - len(self._spec.cross_flows) - (sequence * len(self._pmus) + sources)
         self._announce(np.array(ready, dtype=np.int64), items, kernel.FRAME_ORDER)
