@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 _STREAM_SUFFIX = ".arrows"
 _VALUES_PER_BATCH = 131_072
 _MOST_ROWS_PER_BATCH = 32_768
+_VALUES_PER_ROW_GROUP = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -148,9 +149,14 @@ def write_table(path: Path, columns: Sequence[Column], data: Mapping[str, ArrayL
     part.replace(path)
 
 
-def read_table(path: Path) -> pd.DataFrame:
-    """Return a table; nulls in a column of floats become NaN."""
-    return pd.read_parquet(path)
+def read_table(path: Path, columns: Sequence[str] | None = None) -> pd.DataFrame:
+    """Return a table, or some of its columns; nulls in a column of floats become NaN."""
+    return pd.read_parquet(path, columns=None if columns is None else list(columns))
+
+
+def column_names(path: Path) -> list[str]:
+    """Return the names of a table's columns, in order, without reading the columns."""
+    return list(pq.read_schema(path).names)
 
 
 def units_of(path: Path) -> dict[str, tuple[str, str]]:
@@ -224,12 +230,26 @@ def _to_parquet(stream_path: Path, path: Path) -> bool:
             reader = None
         if reader is not None:
             with pq.ParquetWriter(_part_of(path), reader.schema, compression="zstd") as writer:
-                for batch in _whole_batches(reader):
-                    writer.write_batch(batch)
+                for group in _row_groups(reader):
+                    writer.write_table(group)
     if reader is not None:
         _part_of(path).replace(path)
     stream_path.unlink()
     return reader is not None
+
+
+def _row_groups(reader: pa.RecordBatchReader) -> Iterator[pa.Table]:
+    """Yield the rows in few large groups: a reader pays for each column of each group."""
+    batches: list[pa.RecordBatch] = []
+    values = 0
+    for batch in _whole_batches(reader):
+        batches.append(batch)
+        values += batch.num_rows * batch.num_columns
+        if values >= _VALUES_PER_ROW_GROUP:
+            yield pa.Table.from_batches(batches)
+            batches, values = [], 0
+    if batches:
+        yield pa.Table.from_batches(batches)
 
 
 def _whole_batches(reader: pa.RecordBatchReader) -> Iterator[pa.RecordBatch]:

@@ -31,16 +31,17 @@ class Dummy:
     It leaves `NAME.digest` when it finishes and `NAME.aborted` when it is told to abort.
     """
 
-    def __init__(self, name: str, folder: Path, options: dict[str, Any]) -> None:
+    def __init__(self, name: str, folder: Path, options: dict[str, Any], lead: int = 0) -> None:
         self.name = name
+        self._lead = lead
         self._folder = folder
         self._options = options
         self._digest = hashlib.sha256(name.encode()).digest()
         self._pauses = random.Random(options.get("pause_seed", 0))
 
-    def start(self) -> bytes:
-        """Return a first message; the network has none."""
-        return self._message() if self.name == GRID else b""
+    def start(self) -> list[bytes]:
+        """Return the first messages: one of the grid, of the network as many as it leads by."""
+        return [self._message() for _ in range(1 if self.name == GRID else self._lead)]
 
     def advance(self, k: int, received: bytes) -> bytes:
         """Return the next message, after the pause or the fault that the options ask for."""
@@ -83,16 +84,21 @@ def open_dummy(name: str, run: dict[str, Any], folder: Path) -> Dummy:
     if options.get("fault") == "lie":
         wire.Ledger.to_bytes = lambda self: bytes(48)  # type: ignore[method-assign]
     time.sleep(options.get("open_s", 0.0))
-    return Dummy(name, folder, options)
+    return Dummy(name, folder, options, run["clock"].get("lead", 0))
 
 
 def write_run(
-    folder: Path, core: str, intervals: int, dummies: dict[str, Any], **timeouts: float
+    folder: Path,
+    core: str,
+    intervals: int,
+    dummies: dict[str, Any],
+    lead: int = 0,
+    **timeouts: float,
 ) -> None:
     """Write a run file for dummies into a folder that this makes."""
     folder.mkdir(parents=True, exist_ok=True)
     run = {
-        "clock": {"rate_hz": 60, "intervals": intervals},
+        "clock": {"rate_hz": 60, "intervals": intervals, "lead": lead},
         "federation": {"core": core, "broker_port": None, **timeouts},
         "dummy": dummies,
     }

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from tieline.cosim.exchange import Exchange, run_grid, run_network
-from tieline.cosim.interfaces import Clock
+from tieline.cosim.interfaces import Clock, lead_of
 from tieline.cosim.wire import Kind, Ledger, split
 from tieline.errors import CosimError, TimeContractBroken
 
@@ -42,13 +42,13 @@ class ScriptedLink:
 class Echo:
     """A participant that answers with what it got."""
 
-    def __init__(self, name: str, first: bytes = b"") -> None:
+    def __init__(self, name: str, *first: bytes) -> None:
         self.name = name
         self._first = first
 
-    def start(self) -> bytes:
-        """Return the first message."""
-        return self._first
+    def start(self) -> list[bytes]:
+        """Return the first messages."""
+        return list(self._first)
 
     def advance(self, k: int, received: bytes) -> bytes:
         """Return what came."""
@@ -66,12 +66,12 @@ def bundle(k: int, payload: bytes = b"x") -> bytes:
     return split(Kind.BUNDLE, k, payload, None)[0]
 
 
-def end(*payloads: bytes) -> bytes:
-    """Return the end marker of a stream."""
+def end(*payloads: bytes, k: int = 2) -> bytes:
+    """Return the end marker of a stream of `k` intervals."""
     ledger = Ledger()
     for payload in payloads:
         ledger.add(payload)
-    return split(Kind.END, 2, ledger.to_bytes(), None)[0]
+    return split(Kind.END, k, ledger.to_bytes(), None)[0]
 
 
 def from_network() -> dict[int, list[tuple[int, bytes]]]:
@@ -149,7 +149,7 @@ def test_a_bundle_with_a_foreign_stamp_breaks_the_contract() -> None:
     """If not, frames of one instant could count for another."""
     arrivals = from_grid()
     arrivals[1_000] = [(1, bundle(0))]
-    with pytest.raises(TimeContractBroken, match="came stamped 1 ns, the contract says 0 ns"):
+    with pytest.raises(TimeContractBroken, match="came stamped 1 ns, the contract says 0 at 0 ns"):
         run_as_network(ScriptedLink(arrivals))
 
 
@@ -185,7 +185,95 @@ def test_a_message_beyond_the_end_is_an_error() -> None:
         run_as_grid(ScriptedLink(arrivals))
 
 
-def test_a_network_that_speaks_before_the_start_is_refused() -> None:
-    """If not, its first message would be lost without a word."""
-    with pytest.raises(CosimError, match="before t_0 must be empty"):
+def test_a_network_that_does_not_begin_with_its_lead_is_refused() -> None:
+    """If not, every later delivery would count for another interval."""
+    with pytest.raises(CosimError, match="lead is 0 intervals, but it began with 1 messages"):
         run_network(Echo("network", b"x"), Exchange("network", ScriptedLink({}), CLOCK), CLOCK)
+
+
+LEADING = Clock(60, 5, lead=3)
+T4_NS = 66_666_666
+T5_NS = 83_333_333
+
+
+def test_with_a_lead_the_federates_meet_once_a_stride_and_stamp_for_the_next_meeting() -> None:
+    """If not, one federate would have to wait for the other at every turn."""
+    arrivals = {
+        1_000: [(0, bundle(0)), (0, bundle(1))],
+        T2_NS + 1_000: [(T2_NS, bundle(2)), (T2_NS, bundle(3))],
+        T4_NS + 1_000: [(T4_NS, bundle(4))],
+        T5_NS + 1_000: [(T5_NS, end(*[b"x"] * 5, k=5))],
+    }
+    link = ScriptedLink(arrivals)
+    run_grid(Echo("grid", b"x"), Exchange("grid", link, LEADING), LEADING)
+    assert link.log == [
+        ("send", 0),
+        ("request", 1_000),
+        ("send", T2_NS),
+        ("send", T2_NS),
+        ("request", T2_NS + 1_000),
+        ("send", T4_NS),
+        ("send", T4_NS),
+        ("request", T4_NS + 1_000),
+        ("send", T5_NS),
+        ("send", T5_NS),
+        ("request", T5_NS + 1_000),
+    ]
+
+
+def test_with_a_lead_the_network_hands_over_the_stride_after_the_one_that_begins() -> None:
+    """If not, the grid would have to wait for what arrives in the stride that it simulates."""
+    arrivals = {
+        1_000: [(0, bundle(0))],
+        T2_NS + 1_000: [(T2_NS, bundle(1)), (T2_NS, bundle(2))],
+        T4_NS + 1_000: [(T4_NS, bundle(3)), (T4_NS, bundle(4))],
+        T5_NS + 1_000: [(T5_NS, bundle(5)), (T5_NS, end(*[b"x"] * 6, k=5))],
+    }
+    link = ScriptedLink(arrivals)
+    network = Echo("network", *[b"x"] * 3)
+    run_network(network, Exchange("network", link, LEADING), LEADING)
+    assert link.log == [
+        ("send", 0),
+        ("send", 0),
+        ("request", 1_000),
+        ("send", T2_NS),
+        ("send", T2_NS),
+        ("request", T2_NS + 1_000),
+        ("send", T4_NS),
+        ("request", T4_NS + 1_000),
+        ("send", T5_NS),
+        ("request", T5_NS + 1_000),
+    ]
+
+
+def test_with_a_lead_a_bundle_of_another_stride_breaks_the_contract() -> None:
+    """If not, deliveries could reach the grid a stride early or late."""
+    link = ScriptedLink({1_000: [(0, bundle(0)), (0, bundle(2))]})
+    with pytest.raises(TimeContractBroken, match=r"bundle 2 came .* the contract says 0 to 1"):
+        run_grid(Echo("grid", b"x"), Exchange("grid", link, LEADING), LEADING)
+
+
+P_NS = 1e9 / 60
+
+
+@pytest.mark.parametrize(
+    ("lookahead_ns", "lead", "stride"),
+    [
+        (0, 0, 1),
+        (P_NS - 1, 0, 1),
+        (P_NS + 2, 1, 1),
+        (2.9 * P_NS, 1, 1),
+        (3.1 * P_NS, 3, 2),
+        (88_000_000, 5, 3),
+        (1_250_000_000, 19, 10),
+        (None, 19, 10),
+    ],
+)
+def test_the_lead_is_what_the_lookahead_covers(lookahead_ns, lead, stride) -> None:
+    """If longer, frames would come after the instant at which they matter."""
+    whole_ns = None if lookahead_ns is None else int(lookahead_ns)
+    clock = Clock(60, 1000, lead_of(60, whole_ns))
+    assert (clock.lead, clock.stride) == (lead, stride)
+    if lead and whole_ns is not None:
+        for k in range(1000):
+            assert clock.at_ns(k + 1) + whole_ns > clock.at_ns(k + lead + 1)

@@ -18,7 +18,7 @@ def test_the_run_file_holds_all_that_a_federate_needs(tmp_path: Path) -> None:
     """Otherwise a federate would have to read the experiment again and could read it otherwise."""
     (planned,) = plan_of(tmp_path).runs
     run = json.loads(json.dumps(planned.run))
-    assert run["clock"] == {"rate_hz": 60, "intervals": 2460}
+    assert run["clock"] == {"rate_hz": 60, "intervals": 2460, "lead": 0}
     assert run["sources"] == [
         {"name": "pmu00", "bus": 2},
         {"name": "pmu01", "bus": 61},

@@ -25,7 +25,7 @@ def continuous(miniwecc: Case, tmp_path: Path) -> tuple[list[bytes], Path]:
     """What a grid that forms and delays the average itself sends, and its folder."""
     wams = {"reporting": "continuous"}
     grid = opened(miniwecc, tmp_path, {"events": [TRIP]}, wams, DELAY_S)
-    sent = [grid.start()]
+    sent = grid.start()
     sent += [grid.advance(k, delivered(k)) for k in range(6)]
     grid.finish()
     return sent, tmp_path

@@ -34,7 +34,7 @@ from tieline.units import tick_ns
 def test_the_frames_say_what_the_pmus_measured(miniwecc: Case, tmp_path: Path) -> None:
     """What leaves the grid is what a controller could have measured itself, and nothing else."""
     grid = opened(miniwecc, tmp_path, {"events": [TRIP]})
-    bundles = [FrameBundle.from_bytes(grid.start())]
+    bundles = [FrameBundle.from_bytes(grid.start()[0])]
     bundles += [FrameBundle.from_bytes(grid.advance(k, delivered(k))) for k in range(6)]
     grid.finish()
     table = read_table(tmp_path / "grid.parquet")
@@ -314,7 +314,7 @@ def test_units_without_a_controller_believe_in_synchronous_speed(
         ],
     }
     grid = open_participant(run, tmp_path)
-    assert len(FrameBundle.from_bytes(grid.start()).payloads) == 2
+    assert len(FrameBundle.from_bytes(grid.start()[0]).payloads) == 2
     # Source 0 at 60.5 Hz with weight 3, source 1 at 60 Hz with weight 1.
     frames = np.concatenate([frames_of(F_HZ, 0)[:1], frames_of(60.0, 0)[1:2]])
     grid.advance(0, delivered(0, (10, 1, frames)))

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from grid.runs import G26_AT_100_MS, disturbed, speeds
-from tieline.grid.integrate import METHODS, late_average
+from tieline.grid.integrate import METHODS
 from tieline.grid.simulation import Grid
 from tieline.grid.system import System
+from tieline.grid.wbar import late_average
 
 
 def swing(system: System, method: str, steps_per_second: int) -> np.ndarray:

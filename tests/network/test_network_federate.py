@@ -56,7 +56,7 @@ def frames(k: int) -> FrameBundle:
 
 def delivered(participant: Any, intervals: int) -> list[DeliveryBundle]:
     """Return the deliveries of a whole run."""
-    assert participant.start() == b""
+    assert participant.start() == []
     return [
         DeliveryBundle.from_bytes(participant.advance(k, frames(k).to_bytes()))
         for k in range(intervals)
@@ -196,36 +196,47 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path):
     assert first == again
 
 
-@pytest.mark.parametrize("processing", ["0 ms", "16.6 ms", "16.7 ms", "90 ms"])
-def test_looking_ahead_changes_no_byte(tmp_path: Path, processing: str) -> None:
-    """The network may work while the grid does only where no frame can matter yet."""
+@pytest.mark.parametrize(("processing", "lead"), [("16.7 ms", 1), ("51 ms", 3), ("90 ms", 5)])
+def test_a_lead_changes_no_byte(tmp_path: Path, processing: str, lead: int) -> None:
+    """Otherwise a run would depend on how the federates share their work."""
     text = MINIWECC.read_text(encoding="utf-8")
     assert "pmu: {processing: 88 ms" in text
     topology = tmp_path / "network.yaml"
     topology.write_text(text.replace("pmu: {processing: 88 ms", f"pmu: {{processing: {processing}"))
     sent = []
-    for looks_ahead in (True, False):
-        folder = tmp_path / str(looks_ahead)
+    for lead_taken in (0, lead):
+        folder = tmp_path / str(lead_taken)
         folder.mkdir()
-        participant = open_participant(miniwecc_run(topology), folder)
-        if not looks_ahead:
-            participant._look_ahead = lambda k: None  # type: ignore[method-assign]
-        bundles = []
+        participant = open_participant(miniwecc_run(topology, lead_taken), folder)
+        bundles = participant.start()
         for k in range(12):
             payloads = np.full((3, 34), k, np.uint8)
             frames = FrameBundle(tick_ns(k, 60), payloads)
             bundles.append(participant.advance(k, frames.to_bytes()))
+        assert bundles[12:] == [b""] * lead_taken
         participant.finish()
-        sent.append((bundles, [read_table(path) for path in sorted(folder.glob("*.parquet"))]))
+        tables = [read_table(path) for path in sorted(folder.glob("*.parquet"))]
+        sent.append((bundles[:12], tables))
     assert sent[0][0] == sent[1][0]
     for one, other in zip(sent[0][1], sent[1][1], strict=True):
         assert one.equals(other)
 
 
-def miniwecc_run(topology: Path) -> dict[str, Any]:
+@pytest.mark.parametrize("network", [{}, {"engine": "constant", "delay": 0.25, "topology": None}])
+def test_a_lead_beyond_the_lookahead_is_refused_at_the_first_late_frame(tmp_path, network):
+    """Otherwise deliveries would be handed over without the frames that belong to them."""
+    run = run_file(tmp_path, **network)
+    run["clock"]["lead"] = 19
+    participant = open_participant(run, tmp_path)
+    participant.start()
+    with pytest.raises(CosimError, match="came when the network had reached"):
+        participant.advance(0, frames(0).to_bytes())
+
+
+def miniwecc_run(topology: Path, lead: int) -> dict[str, Any]:
     return {
         "seed": 5,
-        "clock": {"rate_hz": 60, "intervals": 12},
+        "clock": {"rate_hz": 60, "intervals": 12, "lead": lead},
         "network": {"engine": "packet", "topology": str(topology), "loss": 0.02},
         "sources": [{"name": f"pmu{i:02d}", "bus": bus} for i, bus in enumerate((2, 4, 61))],
         "destinations": [

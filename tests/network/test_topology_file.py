@@ -8,7 +8,7 @@ from tieline.errors import InputError
 from tieline.network.jitter import GammaJitter, NormalJitter, UniformJitter
 from tieline.network.settings import NetworkSettings
 from tieline.network.spec import Link, NetworkSpec
-from tieline.network.topology import check_topology, mean_unloaded_delay_ns, read_topology
+from tieline.network.topology import mean_unloaded_delay_ns, network_spec, read_topology
 
 SOURCES = [{"name": "pmu00", "bus": 2}, {"name": "pmu01", "bus": 4}]
 DESTINATIONS = [
@@ -240,10 +240,10 @@ def test_checking_alone_returns_nothing_and_refuses_the_same(tmp_path):
     """Otherwise a run would start that its network then refuses."""
     path = tmp_path / "network.yaml"
     path.write_text(GOOD, encoding="utf-8")
-    check_topology(path, SOURCES, DESTINATIONS, NetworkSettings())
+    network_spec(NetworkSettings(), path, SOURCES, DESTINATIONS)
     path.write_text(GOOD.replace("queue: 7", "queue: 0"), encoding="utf-8")
     with pytest.raises(InputError, match=r"network\.yaml:14"):
-        check_topology(path, SOURCES, DESTINATIONS, NetworkSettings())
+        network_spec(NetworkSettings(), path, SOURCES, DESTINATIONS)
 
 
 def test_a_normal_jitter_is_read(tmp_path):

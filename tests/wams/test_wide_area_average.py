@@ -197,7 +197,7 @@ def test_nothing_delivered_changes_nothing() -> None:
 def test_a_delivery_to_nobody_or_of_nothing_is_refused(controller: int, row: int) -> None:
     """Otherwise memory beyond the tables is read, or another controller's belief is changed."""
     average = average_of([1])
-    with pytest.raises(CosimError, match="a delivery names"):
+    with pytest.raises(CosimError, match="a delivery brings payload"):
         average.deliver(frames([1], 0, [60.0]), np.array([controller]), np.array([row]))
 
 

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
-from tieline.cosim.interfaces import GRID, LAG_NS, NETWORK, Clock, Participant
+from tieline.cosim.interfaces import GRID, NETWORK, Clock, Participant, lag_ns
 from tieline.cosim.wire import Kind, Ledger, Part, join, read_part, split
 from tieline.errors import CosimError, TimeContractBroken
 from tieline.units import ns_to_seconds
@@ -17,11 +17,8 @@ class Link(Protocol):
 
     limit_bytes: int | None
 
-    def ask(self, at_ns: int) -> None:
-        """Request an instant."""
-
-    def granted(self) -> int:
-        """Return the instant granted for the last request, once it is."""
+    def request(self, at_ns: int) -> int:
+        """Return the instant granted for a request of `at_ns`."""
 
     def send(self, data: bytes, at_ns: int) -> None:
         """Send a message that the peer gets once it is granted `at_ns` or later."""
@@ -43,9 +40,10 @@ class Observer(Protocol):
 class Exchange:
     """One federate's side of the contract: numbered bundles, checked stamps, counted streams.
 
-    The federates meet at the first instant t_k of each of the clock's windows. The network is
-    granted t_k + 1 us and sends its bundles then; the grid is granted t_k + 2 us and stamps its
-    bundles with the next meeting's instant, to which HELICS holds them.
+    The federates meet at the first instant t_k of each of the clock's windows. Without a lead the
+    network is granted t_k + 1 us and sends its bundle then; the grid, granted t_k + 2 us, has it at
+    once and stamps its own bundle t_k+1, to which HELICS holds it. With a lead both are granted
+    t_k + 1 us, work side by side, and stamp all that they send with the next meeting's instant.
     """
 
     def __init__(
@@ -63,20 +61,16 @@ class Exchange:
         self.sent = Ledger()
         self.received = Ledger()
 
-    def ask(self, k: int) -> None:
-        """Request the grant of the meeting at t_k; the peer may then go on."""
-        self._link.ask(self._clock.at_ns(k) + LAG_NS[self._name])
-
     def meet(self, k: int) -> None:
-        """Wait for the grant of the meeting at t_k, which was asked for.
+        """Wait for the grant of the meeting at t_k.
 
         Raises:
             TimeContractBroken: another time was granted than asked for.
         """
-        asked_ns = self._clock.at_ns(k) + LAG_NS[self._name]
+        asked_ns = self._clock.at_ns(k) + lag_ns(self._name, self._clock)
         if self._observer is not None:
             self._observer.wait()
-        granted_ns = self._link.granted()
+        granted_ns = self._link.request(asked_ns)
         if granted_ns != asked_ns:
             raise TimeContractBroken(
                 f"{self._name} asked for {ns_to_seconds(asked_ns):.9f} s "
@@ -103,7 +97,7 @@ class Exchange:
         return payload
 
     def send_end(self) -> None:
-        """Tell the peer how much was sent, and its hash."""
+        """Tell the peer how much was sent, and its hash, at the last meeting."""
         last = self._clock.intervals
         self._send(Kind.END, last, self.sent.to_bytes(), self._stamp_ns(self._name, last))
 
@@ -118,8 +112,10 @@ class Exchange:
             left = ", ".join(f"{kind.name.lower()} {k}" for kind, k in self._arrived)
             raise CosimError(f"{self._name} was sent more than the contract knows: {left}")
 
-    def _stamp_ns(self, sender: str, k: int) -> int:
-        return self._clock.at_ns(k) + (LAG_NS[NETWORK] if sender == NETWORK else 0)
+    def _stamp_ns(self, sender: str, meeting: int) -> int:
+        answers_at_once = sender == NETWORK and not self._clock.lead
+        lag = lag_ns(sender, self._clock) if answers_at_once else 0
+        return self._clock.at_ns(meeting) + lag
 
     def _send(self, kind: Kind, k: int, payload: bytes, at_ns: int) -> None:
         for message in split(kind, k, payload, self._link.limit_bytes):
@@ -127,7 +123,7 @@ class Exchange:
 
     def _collect(self, meeting: int) -> None:
         expected_ns = self._stamp_ns(PEER[self._name], meeting)
-        due = _bundles_due(self._name, meeting, self._clock)
+        due = bundles_due(self._name, meeting, self._clock)
         for stamp_ns, data in self._link.receive():
             part = read_part(data)
             if stamp_ns != expected_ns or part.k not in due:
@@ -146,7 +142,7 @@ class Exchange:
         return join(parts)
 
 
-def _bundles_due(name: str, meeting: int, clock: Clock) -> range:
+def bundles_due(name: str, meeting: int, clock: Clock) -> range:
     """Return the numbers of the peer's bundles, or of its end, that come to the meeting at t_k."""
     if name == NETWORK:
         since = 0 if meeting == 0 else (meeting - 1) // clock.stride * clock.stride + 1
@@ -165,12 +161,10 @@ def run_grid(grid: Participant, exchange: Exchange, clock: Clock) -> None:
     [frames] = grid.start()
     exchange.send(0, frames, 0)
     for first, last in clock.windows():
-        exchange.ask(first)
         exchange.meet(first)
         for k in range(first, last):
             exchange.send(k + 1, grid.advance(k, exchange.receive(k)), last)
     exchange.send_end()
-    exchange.ask(clock.intervals)
     exchange.meet(clock.intervals)
     exchange.check_end()
 
@@ -178,33 +172,33 @@ def run_grid(grid: Participant, exchange: Exchange, clock: Clock) -> None:
 def run_network(network: Participant, exchange: Exchange, clock: Clock) -> None:
     """Take the network through every interval, up to the checked end marker.
 
-    With a lead it asks for the next meeting as soon as it has sent, so that the grid can go on, and
-    then works out what it will hand over there.
-
     Raises:
         CosimError: the network's first deliveries are not as many as its lead.
     """
     ready = first_deliveries(network, clock)
-    taken = 0
-    exchange.ask(0)
+
+    def hand_over(meeting: int) -> None:
+        for k in range(meeting, min(meeting + clock.stride, clock.intervals)):
+            exchange.send(k, ready.popleft(), meeting)
+
+    if clock.lead:
+        hand_over(0)
     for first, last in clock.windows():
         exchange.meet(first)
-        if not clock.lead:
-            ready.append(network.advance(first, exchange.receive(first)))
-        for k in range(first, last):
-            exchange.send(k, ready.popleft(), first)
-        exchange.ask(last)
-        if clock.lead:
-            for k in range(taken, first + 1):
-                ready.append(network.advance(k, exchange.receive(k)))
-        taken = first + 1
+        for k in bundles_due(NETWORK, first, clock):
+            ready.append(network.advance(k, exchange.receive(k)))
+        hand_over(last if clock.lead else first)
+    if clock.lead:
+        exchange.send_end()
     exchange.meet(clock.intervals)
-    for k in range(taken, clock.intervals):
+    *left, last = bundles_due(NETWORK, clock.intervals, clock)
+    for k in left:
         network.advance(k, exchange.receive(k))
     # The frames measured at the last instant reach nobody, but they count in the stream.
-    exchange.receive(clock.intervals)
+    exchange.receive(last)
     exchange.check_end()
-    exchange.send_end()
+    if not clock.lead:
+        exchange.send_end()
 
 
 def first_deliveries(network: Participant, clock: Clock) -> deque[bytes]:

@@ -16,8 +16,6 @@ GRID = "grid"
 NETWORK = "network"
 FEDERATES = (GRID, NETWORK)
 ENDPOINTS = {GRID: "grid/bundle", NETWORK: "network/bundle"}
-LAG_NS = {NETWORK: 1_000, GRID: 2_000}
-"""When each federate is granted after t_k: the network first, then the grid that waits for it."""
 
 DELIVERY = np.dtype(
     [
@@ -79,8 +77,9 @@ class Clock:
     def stride(self) -> int:
         """Return the intervals between two meetings.
 
-        At a meeting the network hands over all that arrives before the next one, worked out while
-        the grid was at work on the stride before; so it must lead by all but one of two strides.
+        From one meeting to the next the grid simulates one stride while the network works out the
+        stride after it, with the frames that it got at the meeting; so it must lead by all but one
+        of two strides.
         """
         return (self.lead + 1) // 2 or 1
 
@@ -105,6 +104,11 @@ def lead_of(rate_hz: int, lookahead_ns: int | None) -> int:
         return most
     longest = ((lookahead_ns - 1) * rate_hz - 1) // NS_PER_S
     return max(0, min(most, longest - (longest + 1) % 2))
+
+
+def lag_ns(name: str, clock: Clock) -> int:
+    """Return how long after t_k a federate is granted: together, or the grid after the network."""
+    return 2_000 if name == GRID and not clock.lead else 1_000
 
 
 class Participant(Protocol):

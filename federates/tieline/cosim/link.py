@@ -71,25 +71,14 @@ class HelicsLink:
         except helics.HelicsException as error:
             raise FederationEndedError(f"the federation ended before it began: {error}") from error
 
-    def ask(self, at_ns: int) -> None:
-        """Request a time, ns; what follows may be done while the others get there.
+    def request(self, at_ns: int) -> int:
+        """Return the time granted for a request of `at_ns`, ns.
 
         Raises:
             FederationEndedError: a peer or the broker is gone or raised a global error.
         """
         try:
-            helics.helicsFederateRequestTimeAsync(self._federate, ns_to_seconds(at_ns))
-        except helics.HelicsException as error:
-            raise FederationEndedError(f"the federation ended: {error}") from error
-
-    def granted(self) -> int:
-        """Return the time granted for the last request, ns, once it is.
-
-        Raises:
-            FederationEndedError: a peer or the broker is gone or raised a global error.
-        """
-        try:
-            granted_s = helics.helicsFederateRequestTimeComplete(self._federate)
+            granted_s = helics.helicsFederateRequestTime(self._federate, ns_to_seconds(at_ns))
         except helics.HelicsException as error:
             raise FederationEndedError(f"the federation ended: {error}") from error
         return seconds_to_ns(granted_s)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from tieline.cosim.exchange import first_deliveries
-from tieline.cosim.interfaces import GRID, LAG_NS, NETWORK, Clock, Participant
+from tieline.cosim.interfaces import GRID, NETWORK, Clock, Participant, lag_ns
 
 
 def run_local(
@@ -41,13 +41,13 @@ def _run(
     deliveries = first_deliveries(network, clock)
     for k in range(clock.intervals):
         if progress is not None:
-            progress(NETWORK, k, clock.at_ns(k) + LAG_NS[NETWORK])
+            progress(NETWORK, k, clock.at_ns(k) + lag_ns(NETWORK, clock))
         deliveries.append(network.advance(k, frames))
         if progress is not None:
-            progress(GRID, k, clock.at_ns(k) + LAG_NS[GRID])
+            progress(GRID, k, clock.at_ns(k) + lag_ns(GRID, clock))
         frames = grid.advance(k, deliveries.popleft())
     if progress is not None:
         for name in (NETWORK, GRID):
-            progress(name, clock.intervals, clock.at_ns(clock.intervals) + LAG_NS[name])
+            progress(name, clock.intervals, clock.at_ns(clock.intervals) + lag_ns(name, clock))
     network.finish()
     grid.finish()

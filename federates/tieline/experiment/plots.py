@@ -71,7 +71,7 @@ def _figures(runs: Sequence[Run]) -> dict[str, Figure]:
 def frequency(axes: Axes, runs: Sequence[Run]) -> None:
     """Draw the frequency of the centre of inertia against time, one curve a run."""
     for run, look in zip(runs, _looks(runs), strict=True):
-        grid = run.table("grid")
+        grid = run.table("grid", "t_s", "coi_pu")
         nominal_hz = float(run.told()["frequency_hz"])
         axes.plot(grid["t_s"], nominal_hz * grid["coi_pu"], label=run.label, **look)
     _finish(axes, runs, "system frequency (centre of inertia), Hz")
@@ -82,7 +82,7 @@ def voltage(axes: Axes, runs: Sequence[Run]) -> None:
     """Draw the terminal voltage of one unit against time, one curve a run."""
     unit = drawn_unit(runs[0])
     for run, look in zip(runs, _looks(runs), strict=True):
-        grid = run.table("grid")
+        grid = run.table("grid", "t_s", f"vt_pu.{unit}")
         axes.plot(grid["t_s"], grid[f"vt_pu.{unit}"], label=run.label, **look)
     _finish(axes, runs, f"terminal voltage of {unit}, pu")
 
@@ -104,8 +104,9 @@ def delay_shares(axes: Axes, runs: Sequence[Run]) -> None:
 def believed_average(axes: Axes, runs: Sequence[Run]) -> None:
     """Draw the true centre-of-inertia frequency and what one controller takes it for."""
     run = runs[0]
-    grid, nominal_hz = run.table("grid"), float(run.told()["frequency_hz"])
+    nominal_hz = float(run.told()["frequency_hz"])
     unit = believing_unit(run)
+    grid = run.table("grid", "t_s", "coi_pu", f"wbar_pu.{unit}")
     start_s = min((at for at, _ in run.events()), default=0.0)
     inside = grid["t_s"].between(start_s - BELIEF_WINDOW_S[0], start_s + BELIEF_WINDOW_S[1])
     time_s = grid["t_s"][inside]
@@ -160,18 +161,18 @@ def drawn_unit(run: Run) -> str:
     chosen = run.told().get("plot_unit")
     if chosen:
         return str(chosen)
-    grid = run.table("grid")
     lost = {f"vt_pu.{unit}" for unit in run.tripped_units()}
-    columns = [name for name in grid.columns if name.startswith("vt_pu.") and name not in lost]
-    swings = grid[columns].max() - grid[columns].min()
+    names = run.columns("grid")
+    grid = run.table("grid", *(n for n in names if n.startswith("vt_pu.") and n not in lost))
+    swings = grid.max() - grid.min()
     return str(swings.idxmax()).removeprefix("vt_pu.")
 
 
 def believing_unit(run: Run) -> str | None:
     """Return the unit whose belief is drawn: the drawn one if it has a controller."""
     prefix = "wbar_pu."
-    columns = [name for name in run.table("grid").columns if name.startswith(prefix)]
-    units = [name.removeprefix(prefix) for name in columns]
+    columns = run.columns("grid")
+    units = [name.removeprefix(prefix) for name in columns if name.startswith(prefix)]
     preferred = drawn_unit(run)
     return preferred if preferred in units else next(iter(units), None)
 

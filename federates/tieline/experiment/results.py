@@ -12,7 +12,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 
 from tieline.errors import InputError
-from tieline.tables import read_table
+from tieline.tables import column_names, read_table
 
 MANIFEST = "manifest.json"
 SUMMARY = "summary.json"
@@ -51,10 +51,15 @@ class Run:
         """Return the summary."""
         return read_json(self.folder / SUMMARY)
 
-    def table(self, name: str) -> pd.DataFrame:
-        """Return a table (`grid`, `flows`, ...); one without rows if it was not written."""
+    def table(self, name: str, *columns: str) -> pd.DataFrame:
+        """Return a table (`grid`, `flows`, ...), or some columns; no rows if it was not written."""
         path = self.folder / f"{name}.parquet"
-        return read_table(path) if path.is_file() else pd.DataFrame()
+        return read_table(path, columns or None) if path.is_file() else pd.DataFrame()
+
+    def columns(self, name: str) -> list[str]:
+        """Return the names of a table's columns; none if it was not written."""
+        path = self.folder / f"{name}.parquet"
+        return column_names(path) if path.is_file() else []
 
     def events(self) -> list[tuple[float, str]]:
         """Return (instant in s, what happens) of each event, in order of time."""

@@ -108,7 +108,6 @@ class GridFederate:
         f0_hz = float(case.base.frequency_Hz)
         self._reporter = PmuReporter(idcodes, case.buses.base_kV[system.sensor_bus] * 1e3)
         self._belief = WideAreaAverage(len(run.fitted), idcodes, weights, f0_hz)
-        self._wbar = np.ones(len(case.units))
         is_fitted = np.zeros(len(case.units))
         is_fitted[run.fitted] = 1.0
         self._recorder = Recorder(folder / "grid.parquet", self._grid, sensors, is_fitted)
@@ -128,15 +127,19 @@ class GridFederate:
         first, last = k * self._per_interval, (k + 1) * self._per_interval
         ticks = self._boundaries(bundle, first, last)
         readings = self._belief.read(bundle.payloads)
-        changes = np.unique(ticks).tolist()
-        for tick in sorted({*changes, *self._record_ticks(first, last), first, last}):
+        seen = 0
+        for tick in sorted({*self._record_ticks(first, last), first, last}):
+            until = int(np.searchsorted(ticks, tick, side="right"))
+            if until > seen:
+                records = bundle.records[seen:until]
+                due, wbar_pu = self._belief.averages(
+                    readings, records["destination"], records["payload"], ticks[seen:until]
+                )
+                told = np.ones((len(due), len(self._run.case.units)))
+                told[:, self._run.fitted] = wbar_pu
+                self._grid.expect(due, told)
+                seen = until
             self._grid.advance(tick)
-            due = ticks == tick
-            if due.any():
-                records = bundle.records[due]
-                self._belief.apply(readings, records["destination"], records["payload"])
-                self._wbar[self._run.fitted] = self._belief.wbar_pu
-                self._grid.believe(self._wbar)
             if tick % self._per_record == 0 and tick < last:
                 self._record()
         return self._frames(last)

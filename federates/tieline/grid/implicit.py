@@ -23,7 +23,6 @@ from tieline.grid.integrate import (
     MOVED,
     NO_NETWORK_SOLUTION,
     NOT_CONVERGED,
-    late_average,
 )
 from tieline.grid.jacobian import Elimination, differentiate, eliminate
 from tieline.grid.newton import (
@@ -39,6 +38,7 @@ from tieline.grid.newton import (
 )
 from tieline.grid.plan import HELD, Plan, Work
 from tieline.grid.system import System
+from tieline.grid.wbar import Averages, hear, late_average
 
 Floats = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ class Trapezoid:
         return int(self._step.worst[0])
 
     def advance(
-        self, plan: Plan, work: Work, history: Floats, x: Floats, tick: int, steps: int
+        self, plan: Plan, work: Work, averages: Averages, x: Floats, tick: int, steps: int
     ) -> tuple[int, int]:
         """Integrate `x` in place, as `integrate.Integrator` says."""
         if plan is not self._plan:
@@ -80,10 +80,10 @@ class Trapezoid:
             if self._by is not None:
                 tick, status = advance(
                     self._functions, plan, work, self._blocks, self._by, self._step,
-                    history, x, tick, end - tick, self._h,
+                    averages, x, tick, end - tick, self._h,
                 )  # fmt: skip
             if status == WITH_CARE:
-                status = self._step_with_care(plan, work, history, x, tick)
+                status = self._step_with_care(plan, work, averages, x, tick)
                 tick += status == DONE
             elif status == TIRED:
                 self._by, status = None, DONE
@@ -91,7 +91,9 @@ class Trapezoid:
                 return tick, status
         return end, DONE
 
-    def _step_with_care(self, plan: Plan, work: Work, history: Floats, x: Floats, tick: int) -> int:
+    def _step_with_care(
+        self, plan: Plan, work: Work, averages: Averages, x: Floats, tick: int
+    ) -> int:
         """Take one step, with new matrices where it needs them; return its status.
 
         Where that fails it is tried once more, with new matrices at every iteration.
@@ -100,20 +102,22 @@ class Trapezoid:
         is_late = average.mode != HELD and average.delay_steps > 0
         side, status = s.side.copy(), NOT_CONVERGED
         s.x0[:] = x
+        hear(averages, tick, work.signals[WBAR])
         for is_newton in (False, True):
             if is_late:
-                work.signals[WBAR] = late_average(history, tick, average.delay_steps, 0)
+                work.signals[WBAR] = late_average(averages.past, tick, average.delay_steps, 0)
             if not rhs(self._functions, plan, work, s.x0, s.f0):
                 return NO_NETWORK_SOLUTION
             if is_late:
-                work.signals[WBAR] = late_average(history, tick, average.delay_steps, 2)
+                work.signals[WBAR] = late_average(averages.past, tick, average.delay_steps, 2)
             begin(s, x, work.v)
             status = self._iterate(plan, work, x, is_newton)
             if status == DONE:
                 break
             x[:], work.v[:], s.side[:] = s.x0, s.v0, side
         if status == DONE and average.mode != HELD:
-            history[(tick + 1) % len(history)] = average_now(average, plan.sensors, x)
+            past = averages.past
+            past[(tick + 1) % len(past)] = average_now(average, plan.sensors, x)
         return status
 
     def _iterate(self, plan: Plan, work: Work, x: Floats, is_newton: bool) -> int:

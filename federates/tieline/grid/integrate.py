@@ -13,6 +13,7 @@ from tieline.grid.anti_windup import stop_at_limit
 from tieline.grid.equations import WBAR, average_now, rhs
 from tieline.grid.plan import HELD, Plan, Work
 from tieline.grid.system import System
+from tieline.grid.wbar import Averages, hear, late_average
 
 Floats = NDArray[np.float64]
 
@@ -49,33 +50,13 @@ AT_LIMIT = -1
 MOVED = 1e-9
 """Least motion in a step of a state that is taken to run into a limit."""
 
-HISTORY_MARGIN = 4
-"""Instants that the history of a delayed average holds beyond its delay."""
-
-
-@compiled
-def late_average(history: Floats, tick: int, delay: int, half: int) -> float:
-    """Return the average `delay` steps before `tick` (plus `half` half steps).
-
-    Between two steps it is the cubic through the four nearest instants, of the same order as RK4.
-    """
-    size = len(history)
-    at = tick - delay
-    if half == 0:
-        return history[at % size]
-    if half == 2:
-        return history[(at + 1) % size]
-    inner = history[at % size] + history[(at + 1) % size]
-    outer = history[(at - 1) % size] + history[(at + 2) % size]
-    return (9.0 * inner - outer) / 16.0
-
 
 @compiled
 def advance(
     functions: Any,
     plan: Plan,
     work: Work,
-    history: Floats,
+    averages: Averages,
     x: Floats,
     before: Floats,
     k: Floats,
@@ -88,7 +69,7 @@ def advance(
 
     Args:
         functions, plan, work: the system.
-        history: ring of past averages, indexed by tick; holds the delay and a margin.
+        averages: of the past, and those that will be heard on the way.
         x: states (n,); before: the same one step ago; k: scratch (stages + 1, n).
         tick, steps, h, method: where it starts, how far, step in s, tableau.
 
@@ -99,6 +80,7 @@ def advance(
     stages = len(method.b)
     at_stage = k[stages]
     for now in range(tick, tick + steps):
+        hear(averages, now, work.signals[WBAR])
         for stage in range(stages):
             at_stage[:] = x
             for earlier in range(stage):
@@ -106,7 +88,7 @@ def advance(
                     at_stage += (h * method.a[stage, earlier]) * k[earlier]
             if is_late:
                 delay = plan.average.delay_steps
-                work.signals[WBAR] = late_average(history, now, delay, method.half[stage])
+                work.signals[WBAR] = late_average(averages.past, now, delay, method.half[stage])
             if not rhs(functions, plan, work, at_stage, k[stage]):
                 return now, NO_NETWORK_SOLUTION
             if stage == 0:
@@ -119,7 +101,8 @@ def advance(
         if not np.isfinite(x).all():
             return now, NOT_FINITE
         if plan.average.mode != HELD:
-            history[(now + 1) % len(history)] = average_now(plan.average, plan.sensors, x)
+            past = averages.past
+            past[(now + 1) % len(past)] = average_now(plan.average, plan.sensors, x)
     return tick + steps, DONE
 
 
@@ -132,13 +115,13 @@ class Integrator(Protocol):
         ...
 
     def advance(
-        self, plan: Plan, work: Work, history: Floats, x: Floats, tick: int, steps: int
+        self, plan: Plan, work: Work, averages: Averages, x: Floats, tick: int, steps: int
     ) -> tuple[int, int]:
         """Integrate `x` in place over `steps` steps from `tick`.
 
         Args:
             plan, work: the system as it is now.
-            history: ring of past averages, indexed by tick; holds the delay and a margin.
+            averages: of the past, and those that will be heard on the way.
             x: states (n,).
             tick, steps: where it starts and how far.
 
@@ -169,13 +152,13 @@ class RungeKutta:
         return 0
 
     def advance(
-        self, plan: Plan, work: Work, history: Floats, x: Floats, tick: int, steps: int
+        self, plan: Plan, work: Work, averages: Averages, x: Floats, tick: int, steps: int
     ) -> tuple[int, int]:
         """Integrate `x` in place, as `Integrator` says."""
         end, status = tick + steps, AT_LIMIT
         while status == AT_LIMIT:
             tick, status = advance(
-                self._functions, plan, work, history, x, self._before, self._k,
+                self._functions, plan, work, averages, x, self._before, self._k,
                 tick, end - tick, self._h, self._method,
             )  # fmt: skip
             if status == AT_LIMIT:

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from tieline.compiled import compiled
 from tieline.grid.blocks import Blocks
 from tieline.grid.equations import WBAR, average_now, rhs
-from tieline.grid.integrate import DONE, MOVED, NO_NETWORK_SOLUTION, late_average
+from tieline.grid.integrate import DONE, MOVED, NO_NETWORK_SOLUTION
 from tieline.grid.jacobian import Elimination, correct
 from tieline.grid.plan import HELD, Plan, Work
+from tieline.grid.wbar import Averages, hear, late_average
 
 Floats = NDArray[np.float64]
 
@@ -117,7 +118,7 @@ def advance(
     blocks: Blocks,
     by: Elimination,
     s: Step,
-    history: Floats,
+    averages: Averages,
     x: Floats,
     tick: int,
     steps: int,
@@ -128,7 +129,7 @@ def advance(
     Args:
         functions, plan, work: the system.
         blocks, by, s: how it is solved.
-        history: ring of past averages, indexed by tick; holds the delay and a margin.
+        averages: of the past, and those that will be heard on the way.
         x: states (n,).
         tick, steps, h: where it starts, how far, step in s.
 
@@ -138,12 +139,13 @@ def advance(
     is_late = plan.average.mode != HELD and plan.average.delay_steps > 0
     for now in range(tick, tick + steps):
         s.x0[:] = x
+        hear(averages, now, work.signals[WBAR])
         if is_late:
-            work.signals[WBAR] = late_average(history, now, plan.average.delay_steps, 0)
+            work.signals[WBAR] = late_average(averages.past, now, plan.average.delay_steps, 0)
         if not rhs(functions, plan, work, s.x0, s.f0):
             return now, NO_NETWORK_SOLUTION
         if is_late:
-            work.signals[WBAR] = late_average(history, now, plan.average.delay_steps, 2)
+            work.signals[WBAR] = late_average(averages.past, now, plan.average.delay_steps, 2)
         begin(s, x, work.v)
         last, iterations, is_easy = np.inf, 0, True
         while is_easy:
@@ -159,7 +161,8 @@ def advance(
             x[:], work.v[:] = s.x0, s.v0
             return now, WITH_CARE
         if plan.average.mode != HELD:
-            history[(now + 1) % len(history)] = average_now(plan.average, plan.sensors, x)
+            past = averages.past
+            past[(now + 1) % len(past)] = average_now(plan.average, plan.sensors, x)
         if iterations > MANY:
             return now + 1, TIRED
     return tick + steps, DONE

@@ -14,10 +14,8 @@ from tieline.grid.equations import WBAR, average_now, rhs
 from tieline.grid.events import Disturbance
 from tieline.grid.integrate import (
     DONE,
-    HISTORY_MARGIN,
     NO_NETWORK_SOLUTION,
     NOT_CONVERGED,
-    late_average,
 )
 from tieline.grid.methods import integrator
 from tieline.grid.models.base import SIGNALS
@@ -32,6 +30,7 @@ from tieline.grid.topology import (
     live_buses,
     units_in_service,
 )
+from tieline.grid.wbar import hear, late_average, no_averages
 
 LOOKS_PER_SECOND = 60
 """How often it is checked that every unit is still within bounds."""
@@ -86,7 +85,7 @@ class Grid:
         self._view = _copy(system.work)
         self._x = system.x0.copy()
         self._dx = np.zeros(len(self._x))
-        self._history = np.ones(self._plan.average.delay_steps + HISTORY_MARGIN)
+        self._averages = no_averages(self._plan.average.delay_steps, len(self.in_service))
         self._inertia = system.case.unit_MVA * inertia(system.case)
         self._is_current = False
         self._apply_due()
@@ -101,8 +100,23 @@ class Grid:
         self._work.signals[WBAR] = wbar
         self._is_current = False
 
+    def expect(self, due: NDArray[np.int64], told: Floats) -> None:
+        """Have stabilisers believe averages as soon as they come.
+
+        Args:
+            due: (m,) ascending ticks from the present one on; they replace those given before.
+            told: (m, units) what each unit's stabiliser believes from each of them on, pu.
+        """
+        self._averages = self._averages._replace(due=due, told=told)
+        self._hear()
+
+    def _hear(self) -> None:
+        if np.any(self._averages.due == self.tick):
+            hear(self._averages, self.tick, self._work.signals[WBAR])
+            self._is_current = False
+
     def advance(self, to_tick: int) -> None:
-        """Integrate up to a tick, with the events on the way and those at `to_tick` itself.
+        """Integrate up to a tick, with events and averages on the way and those at `to_tick`.
 
         Raises:
             NumericalError: a state is no longer finite or the network has no solution; names the
@@ -118,13 +132,14 @@ class Grid:
                 self._look()
             if self.ending is None:
                 self._apply_due()
+            self._hear()
 
     def _run(self, to_tick: int) -> None:
         self._is_current = False
         reached, status = self._integrator.advance(
             self._plan,
             self._work,
-            self._history,
+            self._averages,
             self._x,
             self.tick,
             to_tick - self.tick,
@@ -192,7 +207,8 @@ class Grid:
         if average.mode != HELD:
             # A delayed average, too, is without the units that leave from this instant on.
             now = average_now(average, self._plan.sensors, self._x)
-            self._history[self.tick % len(self._history)] = now
+            past = self._averages.past
+            past[self.tick % len(past)] = now
 
     def _freeze(self, change: Change) -> None:
         places = [
@@ -229,7 +245,7 @@ class Grid:
         self._view.v[:] = self._work.v
         delay = self._plan.average.delay_steps
         if self._plan.average.mode != HELD and delay > 0:
-            self._view.signals[WBAR] = late_average(self._history, self.tick, delay, 0)
+            self._view.signals[WBAR] = late_average(self._averages.past, self.tick, delay, 0)
         if not rhs(self.system.functions, self._plan, self._view, self._x, self._dx):
             raise NumericalError(self._failure(self._view))
         self._is_current = True

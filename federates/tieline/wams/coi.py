@@ -159,24 +159,60 @@ class WideAreaAverage:
         Raises:
             CosimError: a controller or a row is out of range.
         """
-        _check_range("controller", destination, len(self._counts))
-        _check_range("payload", payload_row, len(readings.fates))
-        _keep_newest(
+        self.averages(readings, destination, payload_row, np.zeros(len(destination), np.int64))
+
+    def averages(
+        self,
+        readings: Readings,
+        destination: NDArray[np.integer],
+        payload_row: NDArray[np.integer],
+        moments: NDArray[np.int64],
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Hand frames over as `apply` does; return what is believed after each moment.
+
+        Args:
+            readings: as for `apply`.
+            destination: (r,) as for `deliver`.
+            payload_row: (r,) as for `deliver`.
+            moments: (r,) ascending numbers, equal for deliveries that count as one.
+
+        Returns:
+            The moments (m,), each once, and the averages (m, n_controllers) after each, pu.
+
+        Raises:
+            CosimError: a controller or a row is out of range.
+        """
+        is_last = np.ones(len(moments), np.bool_)
+        is_last[:-1] = moments[1:] != moments[:-1]
+        wbar = np.empty((int(is_last.sum()), len(self._counts)))
+        bad = _keep_newest(
             destination.astype(np.int64),
             payload_row.astype(np.int64),
+            is_last,
             readings.fates,
             readings.sensors,
             readings.tags_ns,
             readings.f_hz,
+            self._alpha,
+            self._f0_hz,
             self._f_hz,
             self._tag_ns,
             self._counts,
+            wbar,
         )
+        if bad >= 0:
+            raise CosimError(
+                f"a delivery brings payload {payload_row[bad]} to controller {destination[bad]}; "
+                f"there are {len(readings.fates)} and {len(self._counts)}, both from 0"
+            )
+        return moments[is_last], wbar
 
     @property
     def wbar_pu(self) -> NDArray[np.float64]:
         """The average (n_controllers,), pu of f0."""
-        return _average(self._f_hz, self._alpha, self._f0_hz)
+        wbar = np.empty(len(self._counts))
+        _average(self._f_hz, self._alpha, self._f0_hz, wbar)
+        return wbar
 
     @property
     def held_f_hz(self) -> NDArray[np.float64]:
@@ -206,32 +242,36 @@ class WideAreaAverage:
         return np.maximum(now_ns - np.maximum(self._tag_ns, 0), 0)
 
 
-def _check_range(what: str, values: NDArray[np.integer], count: int) -> None:
-    if values.size and (values.min() < 0 or values.max() >= count):
-        raise CosimError(
-            f"a delivery names {what} {values.min()} to {values.max()}; there are {count}, from 0"
-        )
-
-
 @compiled
 def _keep_newest(
     destination: NDArray[np.int64],
     payload_row: NDArray[np.int64],
+    is_last: NDArray[np.bool_],
     fates: NDArray[np.uint8],
     sensors: NDArray[np.int32],
     tags_ns: NDArray[np.int64],
     f_hz: NDArray[np.float64],
+    alpha: NDArray[np.float64],
+    f0_hz: float,
     held_f_hz: NDArray[np.float64],
     held_ns: NDArray[np.int64],
     counts: NDArray[np.int64],
-) -> None:
+    wbar: NDArray[np.float64],
+) -> int:
     """Put each accepted delivery (r,) into what its controller holds, and count them all.
 
-    `fates`, `sensors`, `tags_ns` and `f_hz` are (m,), by payload; the last three arguments are
-    (n_controllers, n_sensors) or (n_controllers, len(Fate)) and are changed.
+    `fates`, `sensors`, `tags_ns` and `f_hz` are (m,), by payload; what is held is (n_controllers,
+    n_sensors), the counts are (n_controllers, len(Fate)), and `wbar` (last ones, n_controllers)
+    takes the averages after each delivery that is the last of its moment.
+
+    Returns:
+        The first delivery with a controller or a payload that is not there, or -1.
     """
+    row_of_wbar = 0
     for i in range(len(destination)):
         controller, row = destination[i], payload_row[i]
+        if not (0 <= controller < len(counts) and 0 <= row < len(fates)):
+            return i
         fate = fates[row]
         if fate == _ACCEPTED:
             sensor = sensors[row]
@@ -243,22 +283,27 @@ def _keep_newest(
             else:
                 fate = _LATE
         counts[controller, fate] += 1
+        if is_last[i]:
+            _average(held_f_hz, alpha, f0_hz, wbar[row_of_wbar])
+            row_of_wbar += 1
+    return -1
 
 
 @compiled
 def _average(
-    f_hz: NDArray[np.float64], alpha: NDArray[np.float64], f0_hz: float
-) -> NDArray[np.float64]:
-    """Return wbar (n,) of frequencies (n, n_sensors); exactly 1 where every frequency is f0.
+    f_hz: NDArray[np.float64],
+    alpha: NDArray[np.float64],
+    f0_hz: float,
+    wbar: NDArray[np.float64],
+) -> None:
+    """Write wbar (n,) of frequencies (n, n_sensors); exactly 1 where every frequency is f0.
 
     With sum alpha = 1, (1/f0) sum alpha_k f_k = 1 + (1/f0) sum alpha_k (f_k - f0); in this form the
     rounding of the weights cannot move a system at rest.
     """
     n, n_sensors = f_hz.shape
-    wbar = np.empty(n)
     for i in range(n):
         deviation = 0.0
         for k in range(n_sensors):
             deviation += alpha[k] * (f_hz[i, k] - f0_hz)
         wbar[i] = 1.0 + deviation / f0_hz
-    return wbar
