@@ -21,7 +21,7 @@ demo: $(VENV)/runtime
 	$(BIN)/tieline run g26_trip
 
 test: $(VENV)/development
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 lint: $(VENV)/development
 	$(BIN)/ruff check .

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from tieline.tables import (
     Column,
     TableStream,
+    column_names,
     metadata_of,
     read_table,
     salvage,
@@ -116,7 +117,8 @@ def test_a_batch_full_reaches_the_file_without_a_flush(tmp_path: Path) -> None:
     # two integers or floats of 8 bytes a row, in two batches of 32,768 rows that are full
     assert (tmp_path / "links.arrows").stat().st_size - before > 2 * 32_768 * 16
     stream.close()
-    assert pq.ParquetFile(tmp_path / "links.parquet").num_row_groups == 3
+    # The file has them in one group: a reader pays for each column of each group.
+    assert pq.ParquetFile(tmp_path / "links.parquet").num_row_groups == 1
 
 
 def test_units_descriptions_and_facts_travel_with_the_table(tmp_path: Path) -> None:
@@ -187,3 +189,18 @@ def test_columns_need_distinct_names(tmp_path: Path) -> None:
         TableStream(tmp_path / "x.parquet", (COLUMNS[0], COLUMNS[0]), None)
     with pytest.raises(ValueError, match="needs columns"):
         TableStream(tmp_path / "x.parquet", (), None)
+
+
+def test_a_long_table_is_read_in_groups_and_by_columns(tmp_path: Path) -> None:
+    """Otherwise reading one column of a long run would cost the memory of all of them."""
+    columns = [Column("k", "", "row", "int64"), *(Column(f"c{i}", "", "zeros") for i in range(99))]
+    stream = TableStream(tmp_path / "wide.parquet", columns, None)
+    zeros = {f"c{i}": np.zeros(1000) for i in range(99)}
+    for first in range(0, 45_000, 1000):
+        stream.append({"k": np.arange(first, first + 1000), **zeros})
+    stream.close()
+    assert pq.ParquetFile(tmp_path / "wide.parquet").num_row_groups == 3
+    assert column_names(tmp_path / "wide.parquet")[:2] == ["k", "c0"]
+    only = read_table(tmp_path / "wide.parquet", ["k"])
+    assert list(only.columns) == ["k"]
+    assert np.array_equal(only["k"], np.arange(45_000))

@@ -24,10 +24,15 @@ ENDLESS = 100_000
 
 
 def run_pair(
-    folder: Path, core: str, dummies: dict[str, Any], intervals: int = 20, **launch_options: Any
+    folder: Path,
+    core: str,
+    dummies: dict[str, Any],
+    intervals: int = 20,
+    lead: int = 0,
+    **launch_options: Any,
 ) -> tuple[str, str]:
     """Return the digests of what grid and network received in a whole run."""
-    write_run(folder, core, intervals, dummies)
+    write_run(folder, core, intervals, dummies, lead)
     launch(folder, commands=COMMANDS, **launch_options)
     grid, network = ((folder / f"{name}.digest").read_text() for name in ("grid", "network"))
     return grid, network
@@ -76,16 +81,19 @@ def fail_run(
     return failure.value, time.monotonic() - began_s
 
 
-def test_every_core_start_order_and_pause_gives_the_same_bytes(tmp_path: Path) -> None:
+@pytest.mark.parametrize("lead", [0, 5])
+def test_every_core_start_order_and_pause_gives_the_same_bytes(lead: int, tmp_path: Path) -> None:
     """If not, a result would depend on how the federates happened to meet."""
-    alike = run_pair(tmp_path / "local", "local", {})
-    assert run_pair(tmp_path / "inproc", "inproc", SLOW) == alike
-    assert run_pair(tmp_path / "zmq", "zmq", {}) == alike
-    reverse = ("network", "grid")
-    assert run_pair(tmp_path / "late", "zmq", SLOW, order=reverse, stagger_s=0.4) == alike
+    alike = run_pair(tmp_path / "local", "local", {}, lead=lead)
+    assert run_pair(tmp_path / "inproc", "inproc", SLOW, lead=lead) == alike
+    assert run_pair(tmp_path / "zmq", "zmq", {}, lead=lead) == alike
+    late = run_pair(
+        tmp_path / "late", "zmq", SLOW, lead=lead, order=("network", "grid"), stagger_s=0.4
+    )
+    assert late == alike
     # 9 kB bundles are three messages each on tcp, where HELICS loses those above 4,000 bytes.
-    assert run_pair(tmp_path / "tcp", "tcp", {}) == alike
-    assert run_pair(tmp_path / "longer", "local", {}, intervals=21) != alike
+    assert run_pair(tmp_path / "tcp", "tcp", {}, lead=lead) == alike
+    assert run_pair(tmp_path / "longer", "local", {}, intervals=21, lead=lead) != alike
 
 
 def test_a_local_run_needs_no_helics(tmp_path: Path) -> None:

@@ -5,13 +5,17 @@ inproc    grid <-> HELICS <-> network           one process, two threads
 zmq, tcp  grid <-> broker <-> network           three processes, either one first, with pauses
 """
 
+import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from scenarios.study import run
 from tieline.cosim.interfaces import GRID, NETWORK
+from tieline.experiment.launch import Outcome, launch
 from tieline.experiment.results import Run
 
 LOSSY = (
@@ -68,6 +72,25 @@ def test_neither_start_order_nor_pauses_change_a_bit(
         order=order,
         stagger_s=0.5,
     )
+    assert hashes(result) == expected
+
+
+@pytest.mark.helics
+@pytest.mark.parametrize("lead", [0, 1, 3])
+def test_how_far_the_network_leads_changes_no_bit(
+    lead: int, expected: dict[str, str], tmp_path: Path
+) -> None:
+    """How the federates share their work must not decide what comes out of it."""
+
+    def launch_with(folder: Path, report: Callable[..., None], **how: Any) -> Outcome:
+        path = folder / "run.json"
+        told = json.loads(path.read_text())
+        assert told["clock"]["lead"] == 5
+        told["clock"]["lead"] = lead
+        path.write_text(json.dumps(told))
+        return launch(folder, report, **how)
+
+    result = run("g26_trip_smoke", tmp_path / "r", *LOSSY, *core("zmq"), launch=launch_with)
     assert hashes(result) == expected
 
 
