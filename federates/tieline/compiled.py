@@ -75,10 +75,24 @@ def first_class(functions: Sequence[Callable[..., None]], signature: Any) -> Any
     """
     if not IS_ON:
         return tuple(functions)
-    result = List.empty_list(numba.types.FunctionType(signature))
-    for function in functions:
-        result.append(_first_class(function, signature))
+    first, *others = (_first_class(function, signature) for function in functions)
+    result = _list_of(first)
+    for function in others:
+        _append(result, function)
     return result
+
+
+@compiled
+def _list_of(function: Any) -> Any:
+    # A typed list's own methods are compiled anew in every process; these two are cached.
+    result = List()
+    result.append(function)
+    return result
+
+
+@compiled
+def _append(functions: Any, function: Any) -> None:
+    functions.append(function)
 
 
 @cache
