@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 _STREAM_SUFFIX = ".arrows"
 _VALUES_PER_BATCH = 131_072
 _MOST_ROWS_PER_BATCH = 32_768
-_VALUES_PER_ROW_GROUP = 2_000_000
+_VALUES_PER_ROW_GROUP = 250_000
 
 
 @dataclass(frozen=True)
@@ -229,7 +229,11 @@ def _to_parquet(stream_path: Path, path: Path) -> bool:
         except (pa.ArrowInvalid, OSError):
             reader = None
         if reader is not None:
-            with pq.ParquetWriter(_part_of(path), reader.schema, compression="zstd") as writer:
+            # A dictionary of numbers that never repeat costs memory for nothing.
+            texts = [field.name for field in reader.schema if field.type == pa.string()]
+            with pq.ParquetWriter(
+                _part_of(path), reader.schema, compression="zstd", use_dictionary=texts
+            ) as writer:
                 for group in _row_groups(reader):
                     writer.write_table(group)
     if reader is not None:

@@ -5,7 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tieline.grid.loads import LoadCurrents, correction, settle
+from tieline.grid.loads import UNSEEN, LoadCurrents, correction, settle
+
+NOMINAL = np.ones((2, 1))
+"""What nominal frequency makes of one load."""
 
 
 def one_load(p_power: float, p_current: float, q_power: float, q_current: float) -> LoadCurrents:
@@ -22,6 +25,9 @@ def one_load(p_power: float, p_current: float, q_power: float, q_current: float)
         q_power=array(q_power),
         q_current=array(q_current),
         admittance=array((2.0 - 0.5j) / v0**2),
+        p_frequency=array(0.0),
+        q_frequency=array(0.0),
+        filter=np.array([UNSEEN]),
     )
 
 
@@ -39,7 +45,7 @@ def test_a_load_draws_its_constant_power_current_and_impedance_parts(
     r = size / 0.98
     p = 2.0 * ((1 - p_power - p_current) * r**2 + p_current * r + p_power)
     q = 0.5 * ((1 - q_power - q_current) * r**2 + q_current * r + q_power)
-    drawn = load.admittance[0] * v - correction(load, 0, v)
+    drawn = load.admittance[0] * v - correction(load, NOMINAL, 0, v)
     # A dozen roundings of numbers of size 10.
     assert v * np.conj(drawn) == pytest.approx(p + 1j * q, abs=1e-13)
 
@@ -48,7 +54,7 @@ def test_a_load_draws_its_constant_power_current_and_impedance_parts(
 def test_at_half_voltage_and_below_a_load_is_its_nominal_impedance(size: float) -> None:
     """Constant current down to zero voltage has no direction; the reference does the same."""
     load = one_load(0.4, 0.6, 0.0, 1.0)
-    assert correction(load, 0, complex(size)) == 0.0
+    assert correction(load, NOMINAL, 0, complex(size)) == 0.0
 
 
 def test_a_load_that_fits_on_neither_side_of_half_voltage_is_an_impedance() -> None:
@@ -56,7 +62,7 @@ def test_a_load_that_fits_on_neither_side_of_half_voltage_is_an_impedance() -> N
     load = one_load(0.0, 1.0, 0.0, 1.0)
     current = np.zeros(1, complex)
     transfer, v_open = np.array([[0.35 + 0.2j]]), np.array([0.56 + 0j])
-    assert settle(load, transfer, v_open, np.array([1.0 + 0j]), current)
+    assert settle(load, transfer, NOMINAL, v_open, np.array([1.0 + 0j]), current)
     assert current[0] == 0.0
 
 
@@ -66,14 +72,28 @@ def test_the_settled_voltage_satisfies_the_network_and_the_load(transfer: comple
     load = one_load(0.3, 0.7, 0.0, 1.0)
     current = np.zeros(1, complex)
     v_open = np.array([1.02 + 0.1j])
-    assert settle(load, np.array([[transfer]]), v_open, np.array([1.0 + 0j]), current)
+    assert settle(load, np.array([[transfer]]), NOMINAL, v_open, np.array([1.0 + 0j]), current)
     v = v_open[0] + transfer * current[0]
     # The last sweep moved less than 1e-12, and a sweep shrinks the error.
-    assert current[0] == pytest.approx(correction(load, 0, v), abs=1e-11)
+    assert current[0] == pytest.approx(correction(load, NOMINAL, 0, v), abs=1e-11)
 
 
 def test_loads_that_no_voltage_satisfies_are_reported() -> None:
     """Beyond the nose of the curve there is no solution; a returned voltage would be a lie."""
     load = one_load(1.0, 0.0, 0.0, 0.0)
     current = np.zeros(1, complex)
-    assert not settle(load, np.array([[1.5j]]), np.array([1.0 + 0j]), np.array([1.0 + 0j]), current)
+    assert not settle(
+        load, np.array([[1.5j]]), NOMINAL, np.array([1.0 + 0j]), np.array([1.0 + 0j]), current
+    )
+
+
+def test_frequency_scales_active_and_reactive_power_apart() -> None:
+    """A load that answered with the wrong part would damp voltage swings instead of speed."""
+    load = one_load(0.2, 0.3, 0.4, 0.5)
+    v = 0.9 * np.exp(0.4j)
+    drawn = [
+        v * np.conj(load.admittance[0] * v - correction(load, np.array(factor), 0, v))
+        for factor in ([[1.0], [1.0]], [[0.98], [1.03]])
+    ]
+    assert drawn[1].real == pytest.approx(0.98 * drawn[0].real, abs=1e-13)
+    assert drawn[1].imag == pytest.approx(1.03 * drawn[0].imag, abs=1e-13)

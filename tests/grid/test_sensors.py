@@ -12,7 +12,7 @@ F0_HZ = 60.0
 
 def derivative(x: np.ndarray, theta: np.ndarray) -> np.ndarray:
     """Return dx/dt of the sensors of buses with these angles."""
-    sensors = Sensors(np.arange(len(theta)), 0, F0_HZ)
+    sensors = Sensors(np.arange(len(theta)), 0, F0_HZ, len(theta))
     dx = np.zeros_like(x)
     filter_angles(sensors, np.exp(1j * theta), x, dx)
     return dx
@@ -32,7 +32,7 @@ def track(theta: Callable[[float], float], duration_s: float, h: float = 1e-3) -
         k3 = slope(t + h / 2, x + h / 2 * k2)
         k4 = slope(t + h, x + h * k3)
         x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    return float(frequencies(Sensors(np.array([0]), 0, F0_HZ), x)[0])
+    return float(frequencies(Sensors(np.array([0]), 0, F0_HZ, 1), x)[0])
 
 
 @pytest.mark.parametrize("frequency_hz", [0.01, 0.4, 1.0, 2.65, 20.0])

@@ -15,6 +15,7 @@ from tieline.grid.device_tables import (
     parse_devices,
     read_device_table,
 )
+from tieline.grid.settings import STEEPEST_LOAD
 from tieline.grid.tables import Findings, Row, Table, read_table
 
 Floats = NDArray[np.float64]
@@ -30,6 +31,7 @@ _BRANCH_NUMBERS = (
     "resistance_pu", "reactance_pu", "susceptance_pu", "tap_ratio", "phase_shift_deg",
 )  # fmt: skip
 _LOAD_SHARES = ("p_constant_power", "p_constant_current", "q_constant_power", "q_constant_current")
+_LOAD_SLOPES = ("p_frequency", "q_frequency")
 _NO_BUS = -1
 
 
@@ -69,7 +71,8 @@ class Branches:
 class Loads:
     """Arrays (n,): bus index and the parts of its load that are not constant impedance.
 
-    `is_hvdc` marks the terminals of HVDC lines, which are no load.
+    `p_frequency` and `q_frequency` are the relative change of the power for a change of frequency,
+    both in pu. `is_hvdc` marks the terminals of HVDC lines, which are no load.
     """
 
     bus: Integers
@@ -77,6 +80,8 @@ class Loads:
     p_constant_current: Floats
     q_constant_power: Floats
     q_constant_current: Floats
+    p_frequency: Floats
+    q_frequency: Floats
     is_hvdc: NDArray[np.bool_]
 
 
@@ -172,7 +177,9 @@ def _read_tables(folder: Path, findings: Findings) -> dict[str, Table]:
     return {
         "bus": read("bus.csv", ("bus", "kind", "area", *_BUS_NUMBERS), ("area_origin",)),
         "branch": read("branch.csv", (*ends, *_BRANCH_NUMBERS)),
-        "load": read("load.csv", ("bus", *_LOAD_SHARES), ("kind", "note"), must_exist=False),
+        "load": read(
+            "load.csv", ("bus", *_LOAD_SHARES), (*_LOAD_SLOPES, "kind", "note"), must_exist=False
+        ),
         **{role: read_device_table(folder, role, findings) for role in DEVICE_TABLES},
     }
 
@@ -298,7 +305,25 @@ def _loads(table: Table, buses: Buses, places: _Places, findings: Findings) -> L
         if bus[at] != _NO_BUS and buses.p_load[bus[at]] == 0 == buses.q_load[bus[at]]:
             findings.add(row.where, f"bus {row.cells['bus']} has no load in bus.csv")
     is_hvdc = np.array([row.cells.get("kind", "load") == "hvdc" for row in rows], dtype=bool)
-    return Loads(bus, **shares, is_hvdc=is_hvdc)
+    slopes = {name: _slopes(rows, name, is_hvdc, findings) for name in _LOAD_SLOPES}
+    return Loads(bus, **shares, **slopes, is_hvdc=is_hvdc)
+
+
+def _slopes(
+    rows: Sequence[Row], column: str, is_hvdc: NDArray[np.bool_], findings: Findings
+) -> Floats:
+    """Return (rows,) a load's answers to frequency, 0 without the column or in an empty cell."""
+    slopes = [findings.number(row, column) if row.cells.get(column) else 0.0 for row in rows]
+    for row, slope, is_converter in zip(rows, slopes, is_hvdc, strict=True):
+        if abs(slope) > STEEPEST_LOAD:
+            findings.add(
+                row.where,
+                f"'{column}' must lie between -{STEEPEST_LOAD:g} and {STEEPEST_LOAD:g} pu/pu "
+                f"(got {row.cells[column]})",
+            )
+        if slope and is_converter:
+            findings.add(row.where, f"'{column}' must be 0 for an HVDC terminal (got {slope:g})")
+    return np.array(slopes, np.float64)
 
 
 def _units(

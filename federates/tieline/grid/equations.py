@@ -48,10 +48,24 @@ def solve_network(plan: Plan, work: Work) -> bool:
         inner = complex(signals[EPP_RE, i], signals[EPP_IM, i])
         work.source[plan.unit_bus[i]] += plan.unit_admittance[i] * inner
     solve(plan.factors, work.source, work.scratch, work.v_open)
-    converged = settle(plan.loads, plan.load_transfer, work.v_open, work.v, work.source)
+    converged = settle(
+        plan.loads, plan.load_transfer, work.load_factor, work.v_open, work.v, work.source
+    )
     solve(plan.factors, work.source, work.scratch, work.v)
     show_voltages(plan, work)
     return converged
+
+
+@compiled
+def follow_frequency(plan: Plan, work: Work, x: Floats) -> None:
+    """Write how much more (or less) each load draws at the frequency of its own bus."""
+    loads, sensors = plan.loads, plan.sensors
+    z2 = sensors.x0 + len(sensors.bus)
+    for k in range(len(loads.bus)):
+        if loads.filter[k] >= 0:
+            deviation = x[z2 + loads.filter[k]] / (2.0 * np.pi * sensors.f0_Hz)
+            work.load_factor[0, k] = 1.0 + loads.p_frequency[k] * deviation
+            work.load_factor[1, k] = 1.0 + loads.q_frequency[k] * deviation
 
 
 @compiled
@@ -69,7 +83,7 @@ def average_now(average: Average, sensors: Sensors, x: Floats) -> float:
     total = 0.0
     if average.mode == SENSORS:
         z2 = sensors.x0 + len(sensors.bus)
-        for k in range(len(sensors.bus)):
+        for k in range(sensors.pmus):
             total += average.weight[k] * x[z2 + k]
         return 1.0 + total / (2.0 * np.pi * sensors.f0_Hz)
     for k in range(len(average.omega)):
@@ -86,6 +100,7 @@ def rhs(functions: Any, plan: Plan, work: Work, x: Floats, dx: Floats) -> bool:
     solved = True
     for j in range(len(plan.jobs.function)):
         if j == plan.jobs.before_network:
+            follow_frequency(plan, work, x)
             solved = solve_network(plan, work)
             filter_angles(plan.sensors, work.v, x, dx)
             if plan.average.mode != HELD and plan.average.delay_steps == 0:

@@ -12,7 +12,7 @@ def with_load_mix(case: Case, settings: LoadSettings | None) -> Case:
     """Return the case with every load composed as an experiment says; HVDC terminals stay.
 
     Buses whose load is constant impedance in the case are included. The power flow is the same:
-    a mix says how a load answers to voltage, not how large it is.
+    a mix says how a load answers to voltage and frequency, not how large it is.
     """
     if settings is None:
         return case
@@ -30,6 +30,8 @@ def with_load_mix(case: Case, settings: LoadSettings | None) -> Case:
         p_constant_current=shares(case.loads.p_constant_current, settings.p_constant_current),
         q_constant_power=shares(case.loads.q_constant_power, settings.q_constant_power),
         q_constant_current=shares(case.loads.q_constant_current, settings.q_constant_current),
+        p_frequency=shares(case.loads.p_frequency, settings.p_frequency),
+        q_frequency=shares(case.loads.q_frequency, settings.q_frequency),
         is_hvdc=np.concatenate([keep[keep], np.zeros(len(plain), dtype=bool)]),
     )
     return replace(case, loads=mix)

@@ -23,11 +23,18 @@ MAX_SWEEPS = 60
 SWEEPS_TO_CHOOSE = 20
 """Sweeps after which a load at low voltage stays an impedance for the rest of the solution."""
 
+UNSEEN = -1
+"""Marks a load that does not answer to frequency."""
+
 
 class LoadCurrents(NamedTuple):
     """Arrays (m,): bus index, power at the initial voltage `v0`, and its parts.
 
-    `admittance` is what the network matrix holds for the whole load: conj(S0) / v0^2.
+    Attributes:
+        admittance: what the network matrix holds for the whole load, conj(S0) / v0^2.
+        p_frequency, q_frequency: relative change of the power for a change of frequency, both pu.
+        filter: place among `sensors.Sensors` of the filter that shows the load its frequency, or
+            `UNSEEN`.
     """
 
     bus: NDArray[np.int64]
@@ -39,6 +46,15 @@ class LoadCurrents(NamedTuple):
     q_power: Floats
     q_current: Floats
     admittance: Complexes
+    p_frequency: Floats
+    q_frequency: Floats
+    filter: NDArray[np.int64]
+
+
+def frequency_buses(case: Case) -> NDArray[np.int64]:
+    """Return the bus index of every load that answers to frequency."""
+    loads = case.loads
+    return loads.bus[(loads.p_frequency != 0) | (loads.q_frequency != 0)]
 
 
 def nominal_admittance(case: Case, flow: PowerFlow) -> Complexes:
@@ -46,9 +62,13 @@ def nominal_admittance(case: Case, flow: PowerFlow) -> Complexes:
     return np.asarray((case.buses.p_load - 1j * case.buses.q_load) / flow.v**2, np.complex128)
 
 
-def load_currents(case: Case, flow: PowerFlow) -> LoadCurrents:
-    """Return the loads of a case that are not wholly constant impedance."""
+def load_currents(case: Case, flow: PowerFlow, pmus: int) -> LoadCurrents:
+    """Return the loads of a case that are not wholly constant impedance.
+
+    The filters of those that answer to frequency come after `pmus` others.
+    """
     loads, bus = case.loads, case.loads.bus
+    follows = np.isin(bus, frequency_buses(case))
     return LoadCurrents(
         bus=bus,
         p0=case.buses.p_load[bus],
@@ -59,15 +79,20 @@ def load_currents(case: Case, flow: PowerFlow) -> LoadCurrents:
         q_power=loads.q_constant_power,
         q_current=loads.q_constant_current,
         admittance=nominal_admittance(case, flow)[bus],
+        p_frequency=loads.p_frequency,
+        q_frequency=loads.q_frequency,
+        filter=np.where(follows, pmus + np.cumsum(follows) - 1, UNSEEN),
     )
 
 
 @compiled
-def correction(loads: LoadCurrents, k: int, v: complex) -> complex:
+def correction(loads: LoadCurrents, factor: Floats, k: int, v: complex) -> complex:
     """Return the current that the network's constant impedance draws too much for load `k` at `v`.
 
-    With r = |V| / V0, P(r) = P0 (z r^2 + i r + s), likewise Q, and the load drawing conj(S / V),
-    this is Y0 V - conj(S(V) / V); at and below `V_LOW_PU` it is nothing.
+    With r = |V| / V0, P(r) = P0 (z r^2 + i r + s) (1 + k_p df), likewise Q, and the load drawing
+    conj(S / V), this is Y0 V - conj(S(V) / V); at and below `V_LOW_PU` it is nothing. `factor`
+    (2, m) holds 1 + k_p df and 1 + k_q df. Source: IEEE Task Force on Load Representation, Load
+    representation for dynamic performance analysis, IEEE Trans. Power Systems 8 (1993), eq. 1-6.
     """
     size = abs(v)
     if size <= V_LOW_PU:
@@ -75,14 +100,19 @@ def correction(loads: LoadCurrents, k: int, v: complex) -> complex:
     r = size / loads.v0[k]
     p_rest = 1.0 - loads.p_power[k] - loads.p_current[k]
     q_rest = 1.0 - loads.q_power[k] - loads.q_current[k]
-    p = loads.p0[k] * (p_rest * r * r + loads.p_current[k] * r + loads.p_power[k])
-    q = loads.q0[k] * (q_rest * r * r + loads.q_current[k] * r + loads.q_power[k])
+    p = factor[0, k] * loads.p0[k] * (p_rest * r * r + loads.p_current[k] * r + loads.p_power[k])
+    q = factor[1, k] * loads.q0[k] * (q_rest * r * r + loads.q_current[k] * r + loads.q_power[k])
     return (loads.admittance[k] - complex(p, -q) / (size * size)) * v
 
 
 @compiled
 def settle(
-    loads: LoadCurrents, transfer: Complexes, v_open: Complexes, v: Complexes, current: Complexes
+    loads: LoadCurrents,
+    transfer: Complexes,
+    factor: Floats,
+    v_open: Complexes,
+    v: Complexes,
+    current: Complexes,
 ) -> bool:
     """Add the loads' corrections to the injected currents; return whether they converged.
 
@@ -93,6 +123,7 @@ def settle(
     Args:
         loads: the loads (m,).
         transfer: (m, m) Z, voltage at each load for a unit current at each load.
+        factor: (2, m) what frequency makes of active and reactive power.
         v_open: (buses,) voltages without corrections.
         v: (buses,) where to start, such as the last solution.
         current: (buses,) injected currents, added to.
@@ -108,7 +139,7 @@ def settle(
         for k in range(count):
             if sweep > SWEEPS_TO_CHOOSE and abs(here[k]) <= V_LOW_PU:
                 stays_low[k] = True
-            extra[k] = 0.0 if stays_low[k] else correction(loads, k, here[k])
+            extra[k] = 0.0 if stays_low[k] else correction(loads, factor, k, here[k])
         converged = True
         for k in range(count):
             value = v_open[loads.bus[k]]
@@ -122,7 +153,7 @@ def settle(
             break
     for k in range(count):
         if not stays_low[k]:
-            current[loads.bus[k]] += correction(loads, k, here[k])
+            current[loads.bus[k]] += correction(loads, factor, k, here[k])
     return converged
 
 

@@ -85,12 +85,16 @@ class Plan(NamedTuple):
 
 
 class Work(NamedTuple):
-    """What the right-hand side writes and reuses: signals (signals, units), voltages (buses,)."""
+    """What the right-hand side writes and reuses: signals (signals, units), voltages (buses,).
+
+    `load_factor` (2, loads) is what frequency makes of the active and reactive power of loads.
+    """
 
     signals: Floats
     v: Complexes
     v_open: Complexes
     source: Complexes
     scratch: Complexes
+    load_factor: Floats
     u: Floats
     y: Floats

@@ -6,6 +6,7 @@ Realised with z1' = z2 and z2' = b (theta - z1) - a1 z2, whose z2 is the output.
 theta - z1 enters, wrapping it to (-pi, pi] unwraps the bus angle without memory, as long as it is
 smaller: z1 lags by a1/b = 0.1 s, so up to 4.8 Hz off nominal. Beyond, at the terminal of a unit
 that runs away alone, the estimate slips cycles and means nothing.
+Loads that answer to frequency see it through the same filter, at their own bus.
 Source: the miniWECC's frequency sensors (PSTess 1.1, by R. Elliott).
 """
 
@@ -26,11 +27,18 @@ DEAD_PU = 1e-6
 
 
 class Sensors(NamedTuple):
-    """The sensors' buses (m,), the place of their states in x and the system frequency, Hz."""
+    """The filters on bus angles: those of the PMUs, then those of loads that see frequency.
+
+    Attributes:
+        bus: (m,) bus index of each; x0: place of their states (2, m) in x.
+        f0_Hz: system frequency.
+        pmus: how many of them are PMUs.
+    """
 
     bus: NDArray[np.int64]
     x0: int
     f0_Hz: float
+    pmus: int
 
 
 @compiled
@@ -50,6 +58,6 @@ def filter_angles(sensors: Sensors, v: NDArray[np.complex128], x: Floats, dx: Fl
 
 @compiled
 def frequencies(sensors: Sensors, x: Floats) -> Floats:
-    """Return (m,) the frequencies that the sensors show, Hz."""
-    count = len(sensors.bus)
-    return sensors.f0_Hz + x[sensors.x0 + count : sensors.x0 + 2 * count] / (2.0 * np.pi)
+    """Return (pmus,) the frequencies that the PMUs show, Hz."""
+    first = sensors.x0 + len(sensors.bus)
+    return sensors.f0_Hz + x[first : first + sensors.pmus] / (2.0 * np.pi)

@@ -8,21 +8,30 @@ from tieline.grid.event_settings import Event
 from tieline.grid.pss_settings import PssSettings
 from tieline.units import Seconds
 
+STEEPEST_LOAD = 20.0
+"""Largest answer of a load to frequency, pu/pu; measured ones are far below."""
+
 
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 Share = Annotated[StrictFloat, Field(ge=0, le=1)]
+Slope = Annotated[StrictFloat, Field(ge=-STEEPEST_LOAD, le=STEEPEST_LOAD)]
 
 
 class LoadSettings(_Strict):
-    """How every load answers to voltage, in place of the case's own mix; the rest is impedance."""
+    """How every load answers to voltage and frequency, in place of what the case says.
+
+    What is neither constant power nor constant current is constant impedance.
+    """
 
     p_constant_power: Share = Field(0.0, description="share of active power that is constant power")
     p_constant_current: Share = Field(0.0, description="share of it that is constant current")
     q_constant_power: Share = Field(0.0, description="share of reactive power, constant power")
     q_constant_current: Share = Field(0.0, description="share of it that is constant current")
+    p_frequency: Slope = Field(0.0, description="active power's answer to frequency, pu/pu")
+    q_frequency: Slope = Field(0.0, description="reactive power's answer to frequency, pu/pu")
 
     @model_validator(mode="after")
     def _leave_room(self) -> Self:

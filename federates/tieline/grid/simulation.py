@@ -264,10 +264,10 @@ class Grid:
         """Return what the PMUs measure now."""
         self._refresh()
         sensors = self.system.plan.sensors
-        first = sensors.x0 + len(sensors.bus)
-        rocof = self._dx[first : first + len(sensors.bus)] / (2.0 * np.pi)
+        first, bus = sensors.x0 + len(sensors.bus), self.system.sensor_bus
+        rocof = self._dx[first : first + len(bus)] / (2.0 * np.pi)
         f_hz = frequencies(sensors, self._x)
-        return Reading(self._view.v[sensors.bus], f_hz, rocof, self.is_live[sensors.bus])
+        return Reading(self._view.v[bus], f_hz, rocof, self.is_live[bus])
 
     def centre_of_inertia(self) -> float:
         """Return the speed of the units in service, weighted by stored energy, pu.

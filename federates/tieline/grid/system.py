@@ -13,7 +13,7 @@ from tieline.grid.case import Case
 from tieline.grid.devices import Group, groups
 from tieline.grid.equations import rhs
 from tieline.grid.initialise import initial_states, require_rest
-from tieline.grid.loads import load_currents, load_transfer, nominal_admittance
+from tieline.grid.loads import frequency_buses, load_currents, load_transfer, nominal_admittance
 from tieline.grid.models.base import SIGNALS, SIGNATURE, Equation, Machine, Model
 from tieline.grid.network import factorise
 from tieline.grid.plan import ROTORS, SENSORS, Average, Jobs, Plan, Work
@@ -53,7 +53,8 @@ class System:
         Raises:
             NumericalError: the network's equations have no unique solution.
         """
-        parts = _network(self.case, self.flow, self.plan.unit_admittance, state)
+        pmus = self.plan.sensors.pmus
+        parts = _network(self.case, self.flow, self.plan.unit_admittance, state, pmus)
         return self.plan._replace(**parts)
 
 
@@ -81,8 +82,10 @@ def build_system(
     states, signals = initial_states(case, flow, found)
     x0_of = np.cumsum([0] + [state.size for state in states])
     sensor_bus = np.array([case.bus_index(number) for number in sensors], np.int64)
-    filters = Sensors(sensor_bus, int(x0_of[-1]), float(case.base.frequency_Hz))
-    angles = np.concatenate([flow.theta[sensor_bus], np.zeros(len(sensor_bus))])
+    filtered = np.concatenate([sensor_bus, frequency_buses(case)])
+    f0_Hz = float(case.base.frequency_Hz)
+    filters = Sensors(filtered, int(x0_of[-1]), f0_Hz, len(sensor_bus))
+    angles = np.concatenate([flow.theta[filtered], np.zeros(len(filtered))])
     jobs, functions = _jobs(found, x0_of)
     omega = _places(found, x0_of, len(case.units), "omega")
     if average is None:
@@ -92,7 +95,7 @@ def build_system(
         jobs=jobs,
         unit_bus=case.unit_bus,
         unit_admittance=machine,
-        **_network(case, flow, machine, NetworkState()),
+        **_network(case, flow, machine, NetworkState(), len(sensor_bus)),
         sensors=filters,
         average=average._replace(omega=omega),
         frozen=np.zeros(0, np.int64),
@@ -105,7 +108,7 @@ def build_system(
         plan=plan,
         x0=np.concatenate([*(state.ravel() for state in states), angles]),
         labels=_labels(case, found, sensors),
-        work=_work(flow, signals, jobs),
+        work=_work(flow, signals, jobs, len(case.loads.bus)),
         sensor_bus=sensor_bus,
         delta=_places(found, x0_of, len(case.units), "delta"),
     )
@@ -180,14 +183,18 @@ def _jobs(found: Sequence[Group], x0_of: Integers) -> tuple[Jobs, Any]:
 
 
 def _network(
-    case: Case, flow: PowerFlow, unit_admittance: NDArray[np.complex128], state: NetworkState
+    case: Case,
+    flow: PowerFlow,
+    unit_admittance: NDArray[np.complex128],
+    state: NetworkState,
+    pmus: int,
 ) -> dict[str, Any]:
     """Return the network's part of a plan: factors, loads and their transfer."""
     machine = np.zeros(len(flow.v), np.complex128)
     np.add.at(machine, case.unit_bus, unit_admittance)
     load = nominal_admittance(case, flow)
     factors = factorise(network_matrix(case, state, load, machine, flow.v))
-    loads = scaled_loads(load_currents(case, flow), state)
+    loads = scaled_loads(load_currents(case, flow, pmus), state)
     transfer = load_transfer(factors, loads)
     return {"factors": factors, "loads": loads, "load_transfer": transfer}
 
@@ -212,6 +219,8 @@ def _places(found: Sequence[Group], x0_of: Integers, units: int, state: str) -> 
 
 
 def _labels(case: Case, found: Sequence[Group], sensors: Sequence[int]) -> tuple[str, ...]:
+    filters = [f"B{bus}" for bus in sensors]
+    filters += [f"load.B{case.buses.number[bus]}" for bus in frequency_buses(case)]
     names = [
         f"{state}.{case.units[unit]}"
         if group.role == "machine"
@@ -220,10 +229,10 @@ def _labels(case: Case, found: Sequence[Group], sensors: Sequence[int]) -> tuple
         for state in group.model.states
         for unit in group.units
     ]
-    return (*names, *(f"{state}.B{bus}" for state in ("z1", "z2") for bus in sensors))
+    return (*names, *(f"{state}.{place}" for state in ("z1", "z2") for place in filters))
 
 
-def _work(flow: PowerFlow, signals: Floats, jobs: Jobs) -> Work:
+def _work(flow: PowerFlow, signals: Floats, jobs: Jobs, loads: int) -> Work:
     largest = int(max(jobs.n)) * (len(SIGNALS) + 1)
     count = len(flow.v)
     return Work(
@@ -232,6 +241,7 @@ def _work(flow: PowerFlow, signals: Floats, jobs: Jobs) -> Work:
         v_open=flow.phasor,
         source=np.zeros(count, np.complex128),
         scratch=np.zeros(count, np.complex128),
+        load_factor=np.ones((2, loads)),
         u=np.zeros(largest),
         y=np.zeros(largest),
     )
