@@ -13,27 +13,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from tieline.experiment.results import Run
-
-STYLE: Any = {
-    "font.size": 9.0,
-    "axes.titlesize": 9.0,
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "0.9",
-    "grid.linewidth": 0.6,
-    "lines.linewidth": 1.1,
-    "legend.frameon": False,
-    "legend.fontsize": 8.0,
-    "savefig.dpi": 200,
-}
-COLOURS = ("viridis", 0.12, 0.88)
-"""Sequential and safe for the colour-blind; its palest tenth would be lost on white paper."""
+from tieline.figures import COLOURS, PANEL_INCHES, STYLE, save
 
 WITHOUT_PACKETS = "black"
-PANEL_INCHES = (6.3, 3.2)
 MOST_BARS = 80
 
 BELIEF_WINDOW_S = (1.0, 11.0)
@@ -49,13 +31,8 @@ def draw(folder: Path, runs: Sequence[Run]) -> list[Path]:
         folder: where the PNG files go; made if missing.
         runs: at least one complete run, in the order of the legend.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = []
     with mpl.rc_context(STYLE):
-        for name, figure in _figures(runs).items():
-            paths.append(folder / f"{name}.png")
-            figure.savefig(paths[-1])
-    return paths
+        return save(folder, _figures(runs))
 
 
 def _figures(runs: Sequence[Run]) -> dict[str, Figure]:

@@ -10,7 +10,7 @@ is solved frequency by frequency in complex Schur form, where A0 is triangular; 
 rank one and is put in by the Sherman-Morrison formula.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -21,35 +21,18 @@ from scipy.interpolate import AAA
 
 from tieline.compiled import compiled
 from tieline.errors import InputError
+from tieline.linear._delay_roots import delays_of
 from tieline.linear.linearise import LinearSystem
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-LONGEST_DELAY_S = 60.0
 ZERO_TOLERANCE = 1e-9
 """Largest last step of Newton's method at a zero, 1/s."""
 
 _NEWTON_STEPS = 40
+_BESIDE = 3e-3
 _CONTOUR_POINTS = 240
-
-
-def delays_of(linear: LinearSystem, delay_s: ArrayLike) -> Floats:
-    """Return (members,) the delay of each member of the average, s, from one for all or a list.
-
-    Raises:
-        InputError: a delay is negative, not finite or too long, or there are too many or too few.
-    """
-    members = len(linear.average_weights)
-    given = np.asarray(delay_s, np.float64)
-    if given.ndim > 1 or (given.ndim == 1 and len(given) != members):
-        raise InputError(
-            f"one delay is needed, or one for each of the {members} members of the average "
-            f"(got {given.size})"
-        )
-    if not np.all((given >= 0) & (given <= LONGEST_DELAY_S)):
-        raise InputError(f"a delay must be from 0 to {LONGEST_DELAY_S:g} s (got {given.tolist()})")
-    return np.broadcast_to(given, members).copy()
 
 
 @dataclass(frozen=True)
@@ -133,7 +116,11 @@ def _solve(triangle: Complexes, s: complex, columns: Complexes) -> Complexes:
 
 
 def response(
-    linear: LinearSystem, input_: str, output: str, delay_s: ArrayLike = 0.0, sign: float = 1.0
+    linear: LinearSystem,
+    input_: str,
+    output: str,
+    delay_s: float | Sequence[float] = 0.0,
+    sign: float = 1.0,
 ) -> Response:
     """Return a transfer function.
 
@@ -152,7 +139,7 @@ def response(
     return found
 
 
-def open_loop(linear: LinearSystem, unit: str, delay_s: ArrayLike = 0.0) -> Response:
+def open_loop(linear: LinearSystem, unit: str, delay_s: float | Sequence[float] = 0.0) -> Response:
     """Return the open loop H(s) = -v_s / V_ref of one unit, whose stabiliser must be cut.
 
     The stabiliser acts at the exciter's summing point with the sign of the reference, so that with
@@ -267,8 +254,11 @@ def zeros(
     inside = np.linspace(left, right, 9)[1:-1, None] + 1j * np.linspace(low, high, 33)[None, 1:-1]
     samples = np.concatenate([edge, inside.ravel()])
     fit = AAA(samples, function.at(samples), rtol=1e-9, max_terms=80)
+    # Zeros that all but cancel a pole are not in the fit: they are looked for beside the poles.
+    poles = np.diag(function.linear.triangular[0])
+    starts = np.concatenate([fit.roots(), poles + _BESIDE, poles - _BESIDE])
     found: list[complex] = []
-    for start in fit.roots():
+    for start in starts:
         margin = 0.05 * (right - left) + 0.05j * (high - low)
         if not (left - margin.real < start.real < right + margin.real):
             continue

@@ -53,7 +53,7 @@ def retuned(
         }
     )
     for symbol in changes:
-        if symbol not in {name for name, _ in done}:
+        if symbol not in known:
             raise InputError(f"no {role} has a parameter '{symbol}'{near(symbol, known)}")
         for unit in units or ():
             if (symbol, unit) not in done:

@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from numpy.typing import ArrayLike
-
 from tieline.errors import InputError
 from tieline.grid.average import continuous_average
 from tieline.grid.case import Case, load_case
@@ -30,6 +28,8 @@ from tieline.linear.response import Response, open_loop
 from tieline.problems import checked
 from tieline.resources import case_folder
 from tieline.wams.settings import WamsSettings
+
+AVERAGES = ("sensor", "rotor")
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Study:
     gain: float | None = None
     beta1: float | None = None
     beta2: float | None = None
-    average: Literal["sensor", "rotor"] = "sensor"
+    average: str = "sensor"
     weights: str | Sequence[float] = "equal"
     units: Literal["all"] | Sequence[str] = "all"
     file: str | None = None
@@ -73,6 +73,8 @@ class Study:
         pss, wams = self._settings()
         case = with_pss(_with_inertia(case, self.inertia, self.inertia_of), pss)
         sensors = sensor_buses(case, wams)
+        if self.average == "sensor" and isinstance(wams.weights, list):
+            _check_weights(len(wams.weights), len(sensors))
         average = continuous_average(case, sensors, wams, pss.average, 0)
         return build_system(case, solve_power_flow(case), sensors, average)
 
@@ -88,6 +90,8 @@ class Study:
         return load_case(path if (path / "case.yaml").is_file() else case_folder(str(self.case)))
 
     def _settings(self) -> tuple[PssSettings, WamsSettings]:
+        if self.average not in AVERAGES:
+            raise InputError(f"average must be one of {', '.join(AVERAGES)} (got '{self.average}')")
         units = self.units if isinstance(self.units, str) else list(self.units)
         weights = self.weights if isinstance(self.weights, str) else list(self.weights)
         tuning = {name: getattr(self, name) for name in ("gain", "beta1", "beta2")}
@@ -133,7 +137,7 @@ def linear(case: str | Path | Case, cut_pss: Sequence[str] = (), **settings: Any
 def freqresp(
     case: str | Path | Case,
     unit: str,
-    delay_s: ArrayLike = 0.0,
+    delay_s: float | Sequence[float] = 0.0,
     beta1: float | None = None,
     beta2: float | None = None,
     **settings: Any,
@@ -159,6 +163,13 @@ def freqresp(
         **settings,
     }
     return open_loop(linear(case, [unit], **chosen), unit, delay_s)
+
+
+def _check_weights(given: int, sensors: int) -> None:
+    if given != sensors:
+        raise InputError(
+            f"weights must have one weight for each of the {sensors} sensors (got {given})"
+        )
 
 
 def _with_inertia(case: Case, factor: float, units: Literal["all"] | Sequence[str]) -> Case:

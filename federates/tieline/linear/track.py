@@ -23,6 +23,9 @@ Complexes = NDArray[np.complex128]
 SAME = 0.85
 """Part of the old subspace that a new mode must hold to be taken for the same."""
 
+WORST_CONDITION = 1e6
+"""Condition number of an eigenvalue above which its vectors are not looked at."""
+
 LEAST_STEP = 1e-4
 """Smallest step, as a part of the whole path, before a mode counts as lost."""
 
@@ -75,7 +78,9 @@ class _Subspace:
         shares = np.real(
             np.einsum("km,km->m", (modes.left.conj().T @ self.X).T, self.Y.T @ modes.right)
         )
-        shares = np.where(np.isfinite(shares), shares, 0.0) / dimension
+        sizes = np.linalg.norm(modes.left, axis=0) * np.linalg.norm(modes.right, axis=0)
+        # Of modes that all but coincide, as the poles of equal lead-lags, vectors mean nothing.
+        shares = np.where(sizes < WORST_CONDITION, shares, 0.0) / dimension
         oscillates = modes.eigenvalues.imag > OSCILLATES_RAD_S
         shares[oscillates] *= 2.0
         best = int(np.argmax(shares))

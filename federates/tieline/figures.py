@@ -1,0 +1,45 @@
+"""How every figure of the house looks."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+STYLE: Any = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.0,
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "0.9",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.1,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "savefig.dpi": 200,
+}
+COLOURS = ("viridis", 0.12, 0.88)
+"""Sequential and safe for the colour-blind; its palest tenth would be lost on white paper."""
+
+PANEL_INCHES = (6.3, 3.2)
+
+
+def colours(count: int) -> list[Any]:
+    """Return `count` colours of the sequence."""
+    name, first, last = COLOURS
+    step = (last - first) / max(1, count - 1)
+    return [mpl.colormaps[name](first + i * step) for i in range(count)]
+
+
+def save(folder: Path, figures: Mapping[str, Figure]) -> list[Path]:
+    """Write figures as PNG files into a folder, made if missing, and return the files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for name, figure in figures.items():
+        paths.append(folder / f"{name}.png")
+        figure.savefig(paths[-1])
+    return paths
