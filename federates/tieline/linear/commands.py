@@ -26,7 +26,15 @@ from tieline.linear.damping import damping_coefficients
 from tieline.linear.delay import damping_against_delay, delay_margin, delayed_eigenvalues
 from tieline.linear.linearise import linearise
 from tieline.linear.modes import BAND_HZ, COLUMNS, Modes, modes_of
-from tieline.linear.response import decibel, frequencies, margins, open_loop, phase_deg, zeros
+from tieline.linear.response import (
+    decibel,
+    frequencies,
+    margins,
+    open_loop,
+    phase_deg,
+    uncompensated,
+    zeros,
+)
 from tieline.linear.study import Study
 from tieline.linear.sweep import PARAMETERS, sweep
 from tieline.tables import Column, write_table
@@ -153,18 +161,37 @@ def freqresp_answer(
         ],
         ignore_index=True,
     )
+    curves = {label: loop.over(f) for label, loop in responses.items()}
     figures = {
-        "bode": lambda: plots.bode(responses, f),
-        "nyquist": lambda: plots.nyquist(responses, f, gain),
+        "bode": lambda: plots.bode(curves, f),
+        "nyquist": lambda: plots.nyquist({label: gain * H for label, H in curves.items()}),
         "zeros": lambda: plots.pole_zero(poles, found_zeros, ZERO_BAND_HZ),
     }
+    tables = {"zeros": zero_table, "response": pd.concat(parts, ignore_index=True)}
+    bare = uncompensated(linear, unit)
+    if bare is not None:
+        with_washout = open_loop(bare, unit, delays_s[0]).over(f)
+        compensation = {
+            "H": next(iter(curves.values())),
+            "uncompensated, with the washout": with_washout,
+            "compensation": next(iter(curves.values())) / with_washout,
+        }
+        figures["compensation"] = lambda: plots.bode(compensation, f)
+        tables["compensation"] = pd.DataFrame(
+            {
+                "frequency_Hz": f,
+                "uncompensated_dB": decibel(with_washout),
+                "uncompensated_deg": phase_deg(with_washout),
+                "compensation_dB": decibel(compensation["compensation"]),
+                "compensation_deg": phase_deg(compensation["compensation"]),
+            }
+        )
     facts = {
         "margins": {
             label: {name: values.tolist() for name, values in margin._asdict().items()}
             for label, margin in found_margins.items()
         }
     }
-    tables = {"zeros": zero_table, "response": pd.concat(parts, ignore_index=True)}
     return Answer(tables, figures, facts, lines)
 
 
@@ -334,7 +361,9 @@ def _margin_texts(margin: Any, gain: float) -> list[str]:
 
 def _shown(data: pd.DataFrame) -> Table:
     table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, collapse_padding=True)
-    names = [name for name in data.columns if name not in NOT_SHOWN]
+    # Beside the shape there is no room for the real part, which the damping tells.
+    hidden = {*NOT_SHOWN, *(("real_1_per_s",) if "shape" in data else ())}
+    names = [name for name in data.columns if name not in hidden]
     for name in names:
         is_number = pd.api.types.is_numeric_dtype(data[name])
         table.add_column(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tieline.figures import PANEL_INCHES, colours
 from tieline.linear.modes import BAND_HZ, Modes
-from tieline.linear.response import Response, decibel, phase_deg
+from tieline.linear.response import decibel, phase_deg
 from tieline.linear.sweep import Sweep
 
 Floats = NDArray[np.float64]
@@ -106,12 +106,11 @@ def mode_shapes(modes: Modes, places: Sequence[int]) -> Figure:
     return figure
 
 
-def bode(responses: Mapping[str, Response], frequency_hz: Floats) -> Figure:
-    """Return gain and phase of some responses against frequency, by label."""
+def bode(responses: Mapping[str, Complexes], frequency_hz: Floats) -> Figure:
+    """Return gain and phase of some responses (points,) against frequency, by label."""
     figure = Figure(figsize=(6.3, 5.0), layout="constrained")
     gain, phase = figure.subplots(2, 1, sharex=True)
-    for (label, found), colour in zip(responses.items(), colours(len(responses)), strict=True):
-        values = found.over(frequency_hz)
+    for (label, values), colour in zip(responses.items(), colours(len(responses)), strict=True):
         gain.semilogx(frequency_hz, decibel(values), color=colour, label=label)
         phase.semilogx(frequency_hz, _wrapped_together(phase_deg(values)), color=colour)
     gain.set_ylabel("gain, dB")
@@ -123,12 +122,11 @@ def bode(responses: Mapping[str, Response], frequency_hz: Floats) -> Figure:
     return figure
 
 
-def nyquist(responses: Mapping[str, Response], frequency_hz: Floats, gain: float = 1.0) -> Figure:
-    """Return the loops gain * H in the complex plane, with the point -1."""
+def nyquist(loops: Mapping[str, Complexes]) -> Figure:
+    """Return loops (points,) in the complex plane, with the point -1."""
     figure = Figure(figsize=(4.6, 4.4), layout="constrained")
     axes = figure.subplots()
-    for (label, found), colour in zip(responses.items(), colours(len(responses)), strict=True):
-        values = gain * found.over(frequency_hz)
+    for (label, values), colour in zip(loops.items(), colours(len(loops)), strict=True):
         axes.plot(values.real, values.imag, color=colour, label=label)
     axes.plot([-1.0], [0.0], "+", color="black", ms=9)
     axes.axhline(0.0, color="0.8", linewidth=0.6)
@@ -136,7 +134,7 @@ def nyquist(responses: Mapping[str, Response], frequency_hz: Floats, gain: float
     axes.set_xlabel("real part")
     axes.set_ylabel("imaginary part")
     axes.set_aspect("equal", adjustable="datalim")
-    if len(responses) > 1:
+    if len(loops) > 1:
         axes.legend()
     return figure
 

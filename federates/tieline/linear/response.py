@@ -22,16 +22,21 @@ from scipy.interpolate import AAA
 from tieline.compiled import compiled
 from tieline.errors import InputError
 from tieline.linear._delay_roots import delays_of
-from tieline.linear.linearise import LinearSystem
+from tieline.linear.linearise import LinearSystem, linearise
+from tieline.linear.retune import retuned
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+
+LEAD_LAGS = (("T1", "T2"), ("T3", "T4"), ("T5", "T6"))
+"""Symbols of a stabiliser's leads, each with its lag."""
 
 ZERO_TOLERANCE = 1e-9
 """Largest last step of Newton's method at a zero, 1/s."""
 
 _NEWTON_STEPS = 40
 _BESIDE = 3e-3
+_STRAYS = 1.0
 _CONTOUR_POINTS = 240
 
 
@@ -153,6 +158,34 @@ def open_loop(linear: LinearSystem, unit: str, delay_s: float | Sequence[float] 
         if not linear.severed[at]:
             raise InputError(f"the stabiliser of {unit} must be cut: linearise(system, ['{unit}'])")
     return response(linear, f"Vref.{unit}", f"pss.{unit}", delay_s, sign=-1.0)
+
+
+def uncompensated(linear: LinearSystem, unit: str) -> LinearSystem | None:
+    """Return the system with the leads of one unit's stabiliser equal to its lags.
+
+    What is left of the stabiliser is its washout and gain, so that the open loop's quotient with
+    and without leads is what the stabiliser compensates. None where it has no `LEAD_LAGS`.
+
+    Raises:
+        InputError: the unit has no stabiliser.
+    """
+    case = linear.system.case
+    for group in linear.system.groups:
+        rows = group.units.tolist()
+        if group.role != "pss" or case.units.index(unit) not in rows:
+            continue
+        column = rows.index(case.units.index(unit))
+        symbols = [parameter.symbol for parameter in group.model.parameters]
+        found = {
+            lead: float(group.p[symbols.index(lag), column])
+            for lead, lag in LEAD_LAGS
+            if lead in symbols and lag in symbols
+        }
+        if not found:
+            return None
+        system = retuned(linear.system, "pss", found, [unit])
+        return linearise(system, np.array(case.units)[linear.severed].tolist())
+    raise InputError(f"unit '{unit}' has no stabiliser")
 
 
 def decibel(values: Complexes) -> Floats:
@@ -282,6 +315,8 @@ def _newton(function: Response, start: complex) -> complex | None:
             return None
         change = here / slope
         s -= change
+        if not abs(s - start) < _STRAYS:
+            return None
         if abs(change) < ZERO_TOLERANCE:
             return complex(s)
     return None
