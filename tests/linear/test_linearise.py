@@ -18,14 +18,8 @@ from tieline.grid.plan import ROTORS
 from tieline.grid.powerflow import PowerFlow, solve_power_flow
 from tieline.grid.settings import LoadSettings, PssSettings
 from tieline.grid.system import System, build_system, rotor_average, sensor_average
-from tieline.linear.linearise import (
-    BUS_INPUTS,
-    BUS_OUTPUTS,
-    UNIT_INPUTS,
-    UNIT_OUTPUTS,
-    LinearSystem,
-    linearise,
-)
+from tieline.linear.linearise import LinearSystem, linearise
+from tieline.linear.names import BUS_INPUTS, BUS_OUTPUTS, UNIT_INPUTS, UNIT_OUTPUTS
 from tieline.resources import case_folder
 
 Floats = NDArray[np.float64]

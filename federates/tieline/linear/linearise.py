@@ -19,45 +19,34 @@ from scipy.linalg import rsf2csf, schur
 from tieline.errors import InputError
 from tieline.grid.blocks import EMPTY, Blocks, cut
 from tieline.grid.models.base import SIGNALS
-from tieline.grid.plan import ROTORS
 from tieline.grid.system import System
 from tieline.grid.tables import near
 from tieline.linear.differences import (
     INPUTS,
-    P_REF,
     PSS_OUT,
     V_IM,
     V_RE,
-    V_REF,
     V_S_IN,
-    W_0,
     WBAR,
     Local,
     local_derivatives,
 )
+from tieline.linear.names import (
+    BUS_INPUTS,
+    UNIT_INPUTS,
+    UNIT_OUTPUTS,
+    average_rows,
+    bus_row,
+    centre_of_inertia_row,
+    input_names,
+    output_names,
+    pmu_row,
+    unit_row,
+    voltage_part,
+)
 from tieline.linear.network import NetworkDerivatives, network_derivatives, voltages_for
 
 Floats = NDArray[np.float64]
-
-UNIT_OUTPUTS = {
-    "speed": "omega",
-    "delta": "delta",
-    "vt": "vt",
-    "Efd": "Efd",
-    "Ifd": "Ifd",
-    "Pe": "Pe",
-    "Pm": "Pm",
-}
-"""Outputs of a unit by the signals that they are; `pss` is what its stabiliser gives."""
-
-UNIT_INPUTS = {"Vref": V_REF, "Pref": P_REF, "w0": W_0, "wbar": WBAR, "vs": V_S_IN}
-"""Inputs of a unit: references, an error of the average, a signal added at its exciter."""
-
-BUS_INPUTS = ("p_load", "q_load")
-"""Power drawn at a bus beside its load, pu; a change of an HVDC terminal's order is one, too."""
-
-BUS_OUTPUTS = ("v_pu", "theta", "f_hz")
-SYSTEM_OUTPUTS = ("coi", "wbar")
 
 
 @dataclass(frozen=True)
@@ -90,26 +79,12 @@ class LinearSystem:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Return the names of all inputs, such as `Vref.G1` or `p_load.B61`."""
-        case = self.system.case
-        of_units = [f"{name}.{unit}" for name in UNIT_INPUTS for unit in case.units]
-        of_buses = [f"{name}.B{bus}" for name in BUS_INPUTS for bus in case.buses.number]
-        return (*of_units, *of_buses)
+        return input_names(self.system)
 
     @property
     def outputs(self) -> tuple[str, ...]:
         """Return the names of all outputs, such as `speed.G1`, `v_pu.B61`, `p_pu.60-61`, `coi`."""
-        case, sensors = self.system.case, self.system.plan.sensors
-        of_units = [f"{name}.{unit}" for name in (*UNIT_OUTPUTS, "pss") for unit in case.units]
-        of_buses = [f"{name}.B{bus}" for name in ("v_pu", "theta") for bus in case.buses.number]
-        pmus = case.buses.number[sensors.bus[: sensors.pmus]]
-        of_pmus = [f"f_hz.B{bus}" for bus in pmus]
-        return (
-            *of_units,
-            *of_buses,
-            *of_pmus,
-            *(f"p_pu.{name}" for name in case.branches.name),
-            *SYSTEM_OUTPUTS,
-        )
+        return output_names(self.system)
 
     @cached_property
     def A(self) -> Floats:
@@ -207,10 +182,10 @@ class LinearSystem:
         for row, name in enumerate(outputs):
             quantity, _, element = name.partition(".")
             if quantity in UNIT_OUTPUTS or quantity == "pss":
-                at, unit = self._signal_row(quantity), self._unit(name, element)
+                at, unit = self._signal_row(quantity), unit_row(self.system, name, element)
                 result[row] = self.local.signals_by_input[at, unit] @ z[unit]
             else:
-                result[row] = self._voltage_part(name, quantity, element) @ v
+                result[row] = voltage_part(self.system, name) @ v
         return result
 
     @cached_property
@@ -271,7 +246,7 @@ class LinearSystem:
         for row, name in enumerate(outputs):
             quantity, _, element = name.partition(".")
             if quantity in UNIT_OUTPUTS or quantity == "pss":
-                at, unit = self._signal_row(quantity), self._unit(name, element)
+                at, unit = self._signal_row(quantity), unit_row(self.system, name, element)
                 known.setdefault(at, self._signal_states(at))
                 by_input = self.local.signals_by_input[at, unit]
                 rows[row] = known[at][unit] + by_input[V_S_IN] * self._v_s[unit]
@@ -279,13 +254,13 @@ class LinearSystem:
             elif name == "wbar":
                 believed[row] = 1.0
             elif name == "coi":
-                rows[row] = self._centre_of_inertia()
+                rows[row] = centre_of_inertia_row(self.system)
             elif quantity == "f_hz":
                 sensors = self.system.plan.sensors
-                at = self._pmu(name, element)
+                at = pmu_row(self.system, name, element)
                 rows[row, sensors.x0 + len(sensors.bus) + at] = 1.0 / (2.0 * np.pi)
             else:
-                part = self._voltage_part(name, quantity, element)
+                part = voltage_part(self.system, name)
                 rows[row] = (part @ self._ports) @ self._port_states
         return rows, believed
 
@@ -303,9 +278,9 @@ class LinearSystem:
         for column, name in enumerate(inputs):
             quantity, _, element = name.partition(".")
             if quantity in UNIT_INPUTS:
-                z[self._unit(name, element), UNIT_INPUTS[quantity], column] = 1.0
+                z[unit_row(self.system, name, element), UNIT_INPUTS[quantity], column] = 1.0
             elif quantity in BUS_INPUTS:
-                bus = self._bus(name, element)
+                bus = bus_row(self.system, name, element)
                 power = 1.0 if quantity == "p_load" else 1.0j
                 drawn = np.conj(power / self.system.work.v[bus])
                 currents[2 * bus, column], currents[2 * bus + 1, column] = -drawn.real, -drawn.imag
@@ -316,64 +291,6 @@ class LinearSystem:
         given = np.einsum("ui,uik->uk", self.local.signals_by_input[PSS_OUT], z[: blocks.units])
         z[: blocks.units, V_S_IN] += np.where(self.severed[:, None], 0.0, given)
         return z, v
-
-    def _voltage_part(self, name: str, quantity: str, element: str) -> Floats:
-        """Return (2 buses,) what an output is of the voltages; zeros for one that is of states."""
-        case, v = self.system.case, self.system.work.v
-        part = np.zeros(2 * len(v))
-        if quantity == "f_hz":
-            self._pmu(name, element)
-        if name in SYSTEM_OUTPUTS or quantity == "f_hz":
-            return part
-        if quantity == "p_pu":
-            branches = case.branches
-            if element not in branches.name:
-                raise InputError(f"no branch '{element}'{near(element, list(branches.name))}")
-            at = branches.name.index(element)
-            ends = (branches.start[at], branches.end[at])
-            for bus, (by_re, by_im) in zip(ends, _flow_slopes(self.system, at), strict=True):
-                part[2 * bus] += by_re
-                part[2 * bus + 1] += by_im
-            return part
-        if quantity not in ("v_pu", "theta"):
-            raise InputError(f"no output '{name}'{near(name, list(self.outputs))}")
-        bus = self._bus(name, element)
-        size = abs(v[bus])
-        if quantity == "v_pu":
-            part[2 * bus], part[2 * bus + 1] = v[bus].real / size, v[bus].imag / size
-        else:
-            part[2 * bus], part[2 * bus + 1] = -v[bus].imag / size**2, v[bus].real / size**2
-        return part
-
-    def _centre_of_inertia(self) -> Floats:
-        from tieline.grid.average import inertia
-
-        case, omega = self.system.case, self.system.plan.average.omega
-        weight = case.unit_MVA * inertia(case)
-        row = np.zeros(len(self.states))
-        row[omega] = weight / weight.sum()
-        return row
-
-    def _unit(self, name: str, element: str) -> int:
-        units = self.system.case.units
-        if element not in units:
-            raise InputError(f"'{name}': no unit '{element}'{near(element, list(units))}")
-        return units.index(element)
-
-    def _bus(self, name: str, element: str) -> int:
-        numbers = self.system.case.buses.number.tolist()
-        if element[:1] != "B" or not element[1:].isdecimal() or int(element[1:]) not in numbers:
-            known = [f"B{number}" for number in numbers]
-            raise InputError(f"'{name}': no bus '{element}'{near(element, known)}")
-        return numbers.index(int(element[1:]))
-
-    def _pmu(self, name: str, element: str) -> int:
-        sensors = self.system.plan.sensors
-        buses = sensors.bus[: sensors.pmus].tolist()
-        bus = self._bus(name, element)
-        if bus not in buses:
-            raise InputError(f"'{name}': bus {element[1:]} has no PMU")
-        return buses.index(bus)
 
 
 def linearise(system: System, cut_pss: Collection[str] = ()) -> LinearSystem:
@@ -398,34 +315,6 @@ def linearise(system: System, cut_pss: Collection[str] = ()) -> LinearSystem:
         local=local,
         network=network_derivatives(system),
         severed=np.isin(case.units, list(cut_pss)),
-        average_rows=_average_rows(system),
+        average_rows=average_rows(system),
         average_weights=plan.average.weight,
     )
-
-
-def _average_rows(system: System) -> Floats:
-    average, sensors = system.plan.average, system.plan.sensors
-    members = len(average.weight)
-    rows = np.zeros((members, len(system.x0)))
-    if average.mode == ROTORS:
-        rows[np.arange(members), average.omega] = 1.0
-    else:
-        z2 = sensors.x0 + len(sensors.bus)
-        rows[np.arange(members), z2 + np.arange(members)] = 1.0 / (2.0 * np.pi * sensors.f0_Hz)
-    return rows
-
-
-def _flow_slopes(system: System, at: int) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return dP/d(re, im) of the voltages at both ends, for P into a branch at its `from` end."""
-    branches, v = system.case.branches, system.work.v
-    start, end, tap = branches.start[at], branches.end[at], branches.tap[at]
-    series = 1.0 / branches.impedance[at]
-    own = (series + 0.5j * branches.susceptance[at]) / abs(tap) ** 2
-    across = -series / np.conj(tap)
-    current = own * v[start] + across * v[end]
-    # P = Re(V conj(I)); a step dV at one end moves V and I.
-    near_end = [
-        (step * np.conj(current) + v[start] * np.conj(own * step)).real for step in (1.0, 1.0j)
-    ]
-    far_end = [(v[start] * np.conj(across * step)).real for step in (1.0, 1.0j)]
-    return (near_end[0], near_end[1]), (far_end[0], far_end[1])
