@@ -10,6 +10,7 @@ small-signal stability studies, IEEE Trans. Power Systems 1, 1986).
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,9 @@ from tieline.linear.linearise import LinearSystem
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+BALANCINGS = 30
+"""Sweeps that balance a matrix; a few percent are left to gain."""
+
 Entries = tuple[NDArray[np.int64], NDArray[np.int64], Floats]
 
 
@@ -51,15 +55,43 @@ class Descriptor:
         given = [f"v_s.{unit}" for unit in case.units]
         return (*self.linear.states, *voltages, *given, "wbar")
 
+    @cached_property
+    def scale(self) -> Floats:
+        """Return (n + m,) by what each variable is divided so that rows and columns weigh alike.
+
+        Osborne's iteration on the 2-norms of rows and columns beside the diagonal (Osborne, On
+        pre-conditioning of matrices, J. ACM 7, 1960), all at once and therefore by half a step.
+        Without it eigenvalues are a thousand times as sensitive as they need be, and searches
+        believe what they have not seen.
+        """
+        entries = self.matrix.tocoo()
+        beside = (entries.row != entries.col) & (entries.data != 0)
+        row, column, size = entries.row[beside], entries.col[beside], entries.data[beside] ** 2
+        scale = np.ones(len(self.names))
+        for _ in range(BALANCINGS):
+            now = size * (scale[column] / scale[row]) ** 2
+            of_row = np.bincount(row, now, len(scale))
+            of_column = np.bincount(column, now, len(scale))
+            joined = (of_row > 0) & (of_column > 0)
+            scale[joined] *= (of_row[joined] / of_column[joined]) ** 0.125
+        return scale
+
+    @cached_property
+    def balanced(self) -> sparse.csc_matrix:
+        """Return the matrix for variables divided by `scale`."""
+        return (sparse.diags(1.0 / self.scale) @ self.matrix @ sparse.diags(self.scale)).tocsc()
+
     def inverse(self, shift: complex, transposed: bool = False) -> Solve:
         """Return what multiplies columns (n, k) by (A - shift)^-1, or by its transpose.
+
+        A is that of states divided by `scale`.
 
         Raises:
             NumericalError: the shift, 1/s, is an eigenvalue.
         """
         size, n = self.matrix.shape[0], self.states
         diagonal = np.concatenate([np.full(n, shift), np.zeros(size - n)])
-        shifted = (self.matrix - sparse.diags(diagonal)).tocsc()
+        shifted = (self.balanced - sparse.diags(diagonal)).tocsc()
         try:
             factors = splu(
                 shifted,

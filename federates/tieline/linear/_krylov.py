@@ -6,9 +6,10 @@ restarts (Ruhe's banded form; Saad, Numerical Methods for Large Eigenvalue Probl
 section 6.5). ARPACK is asked for a number of eigenvalues and returns when it has them, which takes
 it thousands of solutions where that number cuts through a crowd; here the crowd ends the disc.
 
-The rule that says what is known. A Ritz value has converged when its residual is below `TOLERANCE`
-of its size. Any other may be off by its residual, so it keeps all of |theta| up to its own size and
-residual unknown. The disc reaches as far as no such value does, and what lies inside has converged.
+The rule that says what is known. A Ritz value theta has converged when its residual is below
+`TOLERANCE` of its size. If not, it leaves everything unknown whose inverse is not larger than
+|theta| plus that residual, and `SLACK` of that for the sensitivity of eigenvalues, which a balanced
+matrix keeps low. The disc ends before the first such value, and what lies inside has converged.
 Where as many values coincide as the block has columns, there may be more of them: the disc ends
 before.
 """
@@ -26,6 +27,9 @@ Solve = Callable[[Complexes], Complexes]
 
 TOLERANCE = 1e-9
 """Residual of a converged Ritz value, relative to it."""
+
+SLACK = 0.03
+"""Part by which what has not converged may be nearer than its residual says."""
 
 COINCIDE = 1e-6
 """Distance of eigenvalues that are taken for equal, relative to their distance from the shift."""
@@ -125,7 +129,7 @@ class _Space:
         theta, weights = np.linalg.eig(self.projected[:size, :size])
         residual = np.linalg.norm(self.projected[size : size + block, :size] @ weights, axis=0)
         is_known = (residual < TOLERANCE * np.abs(theta)) & ~_crowded(theta, block)
-        reach = float((np.abs(theta) + residual)[~is_known].max(initial=0.0))
+        reach = float((np.abs(theta) + residual)[~is_known].max(initial=0.0)) * (1.0 + SLACK)
         inside = np.flatnonzero(is_known & (np.abs(theta) > reach))
         order = inside[np.argsort(-np.abs(theta[inside]))]
         return theta[order], weights[:, order], reach
