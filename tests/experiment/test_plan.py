@@ -97,12 +97,6 @@ def test_points_that_look_alike_to_the_case_are_surveyed_once(tmp_path: Path) ->
     assert len(calls) == 1
 
 
-def test_weights_must_match_the_sensors_of_the_case(tmp_path: Path) -> None:
-    """Otherwise the average would leave sensors out, or fail once the run is under way."""
-    with pytest.raises(InputError, match=r"--set wams.weights=\[1\]: .* 3 sensors \(got 1\)"):
-        plan_of(tmp_path, EXPERIMENT, ["wams.weights=[1]"])
-
-
 def test_equal_settings_have_equal_hashes_and_others_not(tmp_path: Path) -> None:
     """Otherwise one could not tell which runs belong to the same experiment."""
     base = {"name": "a", "question": "b", "grid": {"duration": "1 s"}}

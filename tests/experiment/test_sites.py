@@ -14,7 +14,7 @@ REFUSALS = [
     (["grid.events=[{at: 1 s, trip_branch: 60-62}]"], ["no branch '60-62'; did you mean '60-61'"]),
     (["grid.pss.units=[G1, G99]"], ["no unit 'G99'"]),
     (["wams.sensors=[2, 611]"], ["no bus 611 in case 'miniwecc'"]),
-    (["wams.weights=[1, 2]"], ["wams.weights"]),
+    (["wams.weights=[1, 2]"], ["one weight for each of the 30 sensors (got 2)"]),
     (["wams.weights=H", "wams.sensors=[2, 8]"], ["bus 8 has none"]),
     (
         [

@@ -207,9 +207,9 @@ def test_a_belief_acts_from_its_instant_on(tuned: Case, flow: PowerFlow) -> None
     for method, rate in (("rk4", 1920), ("trapezoid", 240), ("trapezoid", 480)):
         grid = Grid(system, method=method, steps_per_second=rate)
         # Small enough to leave every stabiliser within its limits.
-        for k, wbar in enumerate((0.9999, 1.0001, 0.99995, 1.0)):
-            grid.believe(np.full(34, wbar))
-            grid.advance((k + 1) * rate // 20)
+        told = np.repeat([[0.9999], [1.0001], [0.99995], [1.0]], 34, axis=1)
+        grid.expect(np.arange(4) * rate // 20, told)
+        grid.advance(4 * rate // 20)
         ends.append(speeds(grid))
     coarse, fine = (np.abs(end - ends[0]).max() for end in ends[1:])
     assert np.log2(coarse / fine) == pytest.approx(2.0, abs=0.25)

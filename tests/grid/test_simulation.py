@@ -79,11 +79,29 @@ def test_a_held_belief_reaches_the_stabilisers_until_the_next_one(
     average = sensor_average(np.ones(30), mode=0)
     system = build_system(tuned, flow, tuned.base.sensors, average)
     grid = Grid(system, method="rk4", steps_per_second=240)
-    grid.believe(np.full(34, 0.999))
+    grid.expect(np.array([0]), np.full((1, 34), 0.999))
     # nu = (beta1 - beta2) (omega - wbar) > 0 before any rotor has moved.
     assert (grid.signal("v_s") > 0).all()
     grid.advance(24)
     np.testing.assert_array_equal(grid.signal("wbar"), np.full(34, 0.999))
+
+
+@pytest.mark.parametrize("method", ["rk4", "trapezoid"])
+def test_averages_expected_ahead_act_when_they_are_due(
+    method: str, tuned: Case, flow: PowerFlow
+) -> None:
+    """Told all at once or each in its turn, to the last bit."""
+    system = build_system(tuned, flow, tuned.base.sensors, sensor_average(np.ones(30), mode=0))
+    due, told = np.array([0, 3, 7]), np.repeat([[0.9999], [1.0001], [1.0]], 34, axis=1)
+    ahead, in_turn = (Grid(system, method=method, steps_per_second=240) for _ in range(2))
+    ahead.expect(due, told)
+    ahead.advance(12)
+    for k, tick in enumerate(due):
+        in_turn.advance(int(tick))
+        in_turn.expect(due[k : k + 1], told[k : k + 1])
+    in_turn.advance(12)
+    np.testing.assert_array_equal(ahead.x, in_turn.x)
+    assert np.abs(ahead.x - system.x0).max() > 1e-6
 
 
 def test_a_delayed_average_equals_the_undelayed_one_of_earlier(

@@ -19,7 +19,7 @@ from tieline.grid.powerflow import PowerFlow, solve_power_flow
 from tieline.grid.settings import LoadSettings, PssSettings
 from tieline.grid.system import System, build_system, rotor_average, sensor_average
 from tieline.linear.linearise import LinearSystem, linearise
-from tieline.linear.names import BUS_INPUTS, BUS_OUTPUTS, UNIT_INPUTS, UNIT_OUTPUTS
+from tieline.linear.names import BUS_INPUTS, BUS_OUTPUTS, PMU_OUTPUT, UNIT_INPUTS, UNIT_OUTPUTS
 from tieline.resources import case_folder
 
 Floats = NDArray[np.float64]
@@ -113,7 +113,7 @@ def test_names_are_those_of_what_can_be_moved_and_read(linear: LinearSystem) -> 
     kinds = {name.partition(".")[0] for name in linear.inputs}
     assert kinds == {*UNIT_INPUTS, *BUS_INPUTS}
     kinds = {name.partition(".")[0] for name in linear.outputs}
-    assert kinds == {*UNIT_OUTPUTS, "pss", *BUS_OUTPUTS, "p_pu", "coi", "wbar"}
+    assert kinds == {*UNIT_OUTPUTS, "pss", *BUS_OUTPUTS, PMU_OUTPUT, "p_pu", "coi", "wbar"}
 
 
 def test_states_and_outputs_follow_every_state(linear: LinearSystem) -> None:

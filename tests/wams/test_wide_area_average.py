@@ -179,9 +179,20 @@ def test_frames_read_once_can_be_applied_in_parts() -> None:
     readings = parts.read(payloads)
     assert parts.wbar_pu.tolist() == [1.0, 1.0]
     for start, stop in ((0, 1), (1, 1), (1, 4)):
-        parts.apply(readings, controllers[start:stop], rows[start:stop])
+        moments = np.zeros(stop - start, np.int64)
+        parts.apply(readings, controllers[start:stop], rows[start:stop], moments)
     assert parts.held_f_hz.tolist() == whole.held_f_hz.tolist()
     assert counts_of(parts, 1) == counts_of(whole, 1) == {"accepted": 1, "duplicate": 1}
+
+
+def test_what_is_believed_is_told_after_each_moment() -> None:
+    """A controller that heard of a later frame early would act on it before it came."""
+    average = average_of([1, 2])
+    readings = average.read(frames([1, 2], 0, [61.0, 62.0]))
+    controllers, rows = np.array([0, 1, 0]), np.array([0, 0, 1])
+    moments, wbar = average.apply(readings, controllers, rows, np.array([3, 3, 5]))
+    assert moments.tolist() == [3, 5]
+    np.testing.assert_allclose(wbar * 60, [[60.5, 60.5], [61.5, 60.5]], rtol=1e-15)
 
 
 def test_nothing_delivered_changes_nothing() -> None:

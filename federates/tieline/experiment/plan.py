@@ -77,13 +77,6 @@ def _planned(study: Study, point: Point, survey: Survey, known: dict[str, Sites]
     if key not in known:
         known[key] = survey(experiment, folder, topology)
     sites = known[key]
-    weights = experiment.wams.weights
-    of_rotors = experiment.grid.pss.average == "rotors"
-    if not isinstance(weights, str) and not of_rotors and len(weights) != len(sites.sensors):
-        raise InputError(
-            f"wams.weights must have one weight for each of the {len(sites.sensors)} sensors"
-            f" (got {len(weights)})"
-        )
     inputs = {"case": _folder_hash(folder)}
     if topology is not None:
         inputs["topology"] = hashlib.sha256(topology.read_bytes()).hexdigest()

@@ -84,9 +84,15 @@ def sensor_weights(case: Case, sensors: Sequence[int], weights: str | Sequence[f
     """Return (sensors,) the weight of each sensor with every unit in service, not scaled.
 
     Raises:
-        InputError: a sensor that has to be weighed by its units has none.
+        InputError: a list has not one weight a sensor, or a sensor that has to be weighed by its
+            units has none.
     """
     if not isinstance(weights, str):
+        if len(weights) != len(sensors):
+            raise InputError(
+                f"wams.weights must have one weight for each of the {len(sensors)} sensors"
+                f" (got {len(weights)})"
+            )
         return np.asarray(weights, np.float64)
     if weights == "equal":
         return np.ones(len(sensors))

@@ -132,7 +132,7 @@ class GridFederate:
             until = int(np.searchsorted(ticks, tick, side="right"))
             if until > seen:
                 records = bundle.records[seen:until]
-                due, wbar_pu = self._belief.averages(
+                due, wbar_pu = self._belief.apply(
                     readings, records["destination"], records["payload"], ticks[seen:until]
                 )
                 told = np.ones((len(due), len(self._run.case.units)))

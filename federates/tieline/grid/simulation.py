@@ -95,11 +95,6 @@ class Grid:
         """Return (n,) the states, a copy."""
         return self._x.copy()
 
-    def believe(self, wbar: Floats) -> None:
-        """Set the average speed (units,) that each unit's stabiliser believes from now on."""
-        self._work.signals[WBAR] = wbar
-        self._is_current = False
-
     def expect(self, due: NDArray[np.int64], told: Floats) -> None:
         """Have stabilisers believe averages as soon as they come.
 

@@ -127,9 +127,10 @@ def freqresp_answer(
     linear = linearise(study.system(), [unit])
     f = frequencies(band_hz)
     responses = {f"{delay:g} s": open_loop(linear, unit, delay) for delay in delays_s}
+    curves = {label: loop.over(f) for label, loop in responses.items()}
     parts, found_zeros, found_margins, lines = [], {}, {}, []
     for (label, loop), delay in zip(responses.items(), delays_s, strict=True):
-        H = loop.over(f)
+        H = curves[label]
         parts.append(
             pd.DataFrame(
                 {
@@ -161,7 +162,6 @@ def freqresp_answer(
         ],
         ignore_index=True,
     )
-    curves = {label: loop.over(f) for label, loop in responses.items()}
     figures = {
         "bode": lambda: plots.bode(curves, f),
         "nyquist": lambda: plots.nyquist({label: gain * H for label, H in curves.items()}),
@@ -170,11 +170,14 @@ def freqresp_answer(
     tables = {"zeros": zero_table, "response": pd.concat(parts, ignore_index=True)}
     bare = uncompensated(linear, unit)
     if bare is not None:
-        with_washout = open_loop(bare, unit, delays_s[0]).over(f)
+        first, with_washout = (
+            next(iter(curves.values())),
+            open_loop(bare, unit, delays_s[0]).over(f),
+        )
         compensation = {
-            "H": next(iter(curves.values())),
+            "H": first,
             "uncompensated, with the washout": with_washout,
-            "compensation": next(iter(curves.values())) / with_washout,
+            "compensation": first / with_washout,
         }
         figures["compensation"] = lambda: plots.bode(compensation, f)
         tables["compensation"] = pd.DataFrame(

@@ -33,6 +33,7 @@ from tieline.linear.differences import (
 )
 from tieline.linear.names import (
     BUS_INPUTS,
+    PMU_OUTPUT,
     UNIT_INPUTS,
     UNIT_OUTPUTS,
     average_rows,
@@ -255,7 +256,7 @@ class LinearSystem:
                 believed[row] = 1.0
             elif name == "coi":
                 rows[row] = centre_of_inertia_row(self.system)
-            elif quantity == "f_hz":
+            elif quantity == PMU_OUTPUT:
                 sensors = self.system.plan.sensors
                 at = pmu_row(self.system, name, element)
                 rows[row, sensors.x0 + len(sensors.bus) + at] = 1.0 / (2.0 * np.pi)

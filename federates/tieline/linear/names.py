@@ -29,7 +29,8 @@ UNIT_INPUTS = {"Vref": V_REF, "Pref": P_REF, "w0": W_0, "wbar": WBAR, "vs": V_S_
 BUS_INPUTS = ("p_load", "q_load")
 """Power drawn at a bus beside its load, pu; a change of an HVDC terminal's order is one, too."""
 
-BUS_OUTPUTS = ("v_pu", "theta", "f_hz")
+BUS_OUTPUTS = ("v_pu", "theta")
+PMU_OUTPUT = "f_hz"
 SYSTEM_OUTPUTS = ("coi", "wbar")
 
 
@@ -45,9 +46,9 @@ def output_names(system: System) -> tuple[str, ...]:
     """Return the names of all outputs, such as `speed.G1`, `v_pu.B61`, `p_pu.60-61`, `coi`."""
     case, sensors = system.case, system.plan.sensors
     of_units = [f"{name}.{unit}" for name in (*UNIT_OUTPUTS, "pss") for unit in case.units]
-    of_buses = [f"{name}.B{bus}" for name in ("v_pu", "theta") for bus in case.buses.number]
+    of_buses = [f"{name}.B{bus}" for name in BUS_OUTPUTS for bus in case.buses.number]
     pmus = case.buses.number[sensors.bus[: sensors.pmus]]
-    of_pmus = [f"f_hz.B{bus}" for bus in pmus]
+    of_pmus = [f"{PMU_OUTPUT}.B{bus}" for bus in pmus]
     of_branches = [f"p_pu.{name}" for name in case.branches.name]
     return (*of_units, *of_buses, *of_pmus, *of_branches, *SYSTEM_OUTPUTS)
 
@@ -88,9 +89,10 @@ def voltage_part(system: System, name: str) -> Floats:
     quantity, _, element = name.partition(".")
     case, v = system.case, system.work.v
     part = np.zeros(2 * len(v))
-    if quantity == "f_hz":
+    if quantity == PMU_OUTPUT:
         pmu_row(system, name, element)
-    if name in SYSTEM_OUTPUTS or quantity == "f_hz":
+        return part
+    if name in SYSTEM_OUTPUTS:
         return part
     if quantity == "p_pu":
         branches = case.branches
@@ -102,7 +104,7 @@ def voltage_part(system: System, name: str) -> Floats:
             part[2 * bus] += by_re
             part[2 * bus + 1] += by_im
         return part
-    if quantity not in ("v_pu", "theta"):
+    if quantity not in BUS_OUTPUTS:
         raise InputError(f"no output '{name}'{near(name, list(output_names(system)))}")
     bus = bus_row(system, name, element)
     size = abs(v[bus])

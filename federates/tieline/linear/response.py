@@ -140,6 +140,7 @@ def response(
         InputError: an input, output or delay that cannot be.
     """
     found = Response(linear, input_, output, delays_of(linear, delay_s), sign)
+    # Names are looked up when the first value is asked for: an unknown one is to be refused here.
     found.at(1j)
     return found
 

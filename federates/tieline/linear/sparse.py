@@ -67,7 +67,8 @@ def modes_near(of: Descriptor, shift: complex, count: int) -> Modes:
         raise InputError(f"a shift must have an imaginary part >= 0 (got {shift:.6g})")
     if not 1 <= count <= of.states // 2:
         raise InputError(f"count must be >= 1 and <= {of.states // 2}, half the states ({count=})")
-    if of.states <= SMALL:
+    # So many modes would ask for a search space of the size of the system.
+    if of.states <= max(SMALL, 4 * count):
         dense = modes_of(of.linear)
         return _picked(dense, np.argsort(np.abs(dense.eigenvalues - shift))[:count])
     solve = of.inverse(shift)

@@ -73,8 +73,6 @@ class Study:
         pss, wams = self._settings()
         case = with_pss(_with_inertia(case, self.inertia, self.inertia_of), pss)
         sensors = sensor_buses(case, wams)
-        if self.average == "sensor" and isinstance(wams.weights, list):
-            _check_weights(len(wams.weights), len(sensors))
         average = continuous_average(case, sensors, wams, pss.average, 0)
         return build_system(case, solve_power_flow(case), sensors, average)
 
@@ -163,13 +161,6 @@ def freqresp(
         **settings,
     }
     return open_loop(linear(case, [unit], **chosen), unit, delay_s)
-
-
-def _check_weights(given: int, sensors: int) -> None:
-    if given != sensors:
-        raise InputError(
-            f"weights must have one weight for each of the {sensors} sensors (got {given})"
-        )
 
 
 def _with_inertia(case: Case, factor: float, units: Literal["all"] | Sequence[str]) -> Case:

@@ -137,7 +137,8 @@ class WideAreaAverage:
         Raises:
             CosimError: a controller or a row is out of range.
         """
-        self.apply(self.read(payloads), destination, payload_row)
+        at_once = np.zeros(len(destination), np.int64)
+        self.apply(self.read(payloads), destination, payload_row, at_once)
 
     def read(self, payloads: NDArray[np.uint8]) -> Readings:
         """Return what the frames (m, size) say, for `apply`; no controller holds them yet."""
@@ -153,25 +154,12 @@ class WideAreaAverage:
         readings: Readings,
         destination: NDArray[np.integer],
         payload_row: NDArray[np.integer],
-    ) -> None:
-        """Hand frames that were read once to controllers; see `deliver`.
-
-        Raises:
-            CosimError: a controller or a row is out of range.
-        """
-        self.averages(readings, destination, payload_row, np.zeros(len(destination), np.int64))
-
-    def averages(
-        self,
-        readings: Readings,
-        destination: NDArray[np.integer],
-        payload_row: NDArray[np.integer],
         moments: NDArray[np.int64],
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Hand frames over as `apply` does; return what is believed after each moment.
+        """Hand frames that were read once to controllers; return what is believed afterwards.
 
         Args:
-            readings: as for `apply`.
+            readings: what `read` returned for the payloads.
             destination: (r,) as for `deliver`.
             payload_row: (r,) as for `deliver`.
             moments: (r,) ascending numbers, equal for deliveries that count as one.
