@@ -42,18 +42,24 @@ def cut(plan: Plan, states: int) -> Blocks:
     """
     jobs, sensors = plan.jobs, plan.sensors
     units, count = len(plan.unit_bus), len(sensors.bus)
-    places: list[list[int]] = [[] for _ in range(units)]
     groups = {int(x0): j for j, x0 in enumerate(jobs.x0) if jobs.n_states[j] > 0}
-    for x0, j in sorted(groups.items()):
-        of = jobs.units[jobs.units_at[j] : jobs.units_at[j + 1]]
-        for row in range(jobs.n_states[j]):
-            for column, unit in enumerate(of):
-                places[unit].append(x0 + row * len(of) + column)
-    places += [[sensors.x0 + k, sensors.x0 + count + k] for k in range(count)]
-    if sorted(place for block in places for place in block) != list(range(states)):
+    held = [
+        (x0, int(jobs.n_states[j]), jobs.units[jobs.units_at[j] : jobs.units_at[j + 1]])
+        for x0, j in sorted(groups.items())
+    ]
+    size = np.full(units + count, 2, np.int64)
+    size[:units] = 0
+    for _, states_each, of in held:
+        size[of] += states_each
+    place = np.full((len(size), int(size.max())), EMPTY, np.int64)
+    filled = np.zeros(units, np.int64)
+    for x0, states_each, of in held:
+        rows = np.arange(states_each)
+        place[of[:, None], filled[of, None] + rows] = (
+            x0 + rows * len(of) + np.arange(len(of))[:, None]
+        )
+        filled[of] += states_each
+    place[units:, :2] = sensors.x0 + np.arange(count)[:, None] + count * np.arange(2)
+    if not np.array_equal(np.sort(place[place != EMPTY]), np.arange(states)):
         raise ValueError("a state belongs to no unit and no sensor, or to two")
-    size = np.array([len(block) for block in places], np.int64)
-    table = np.full((len(places), int(size.max())), EMPTY, np.int64)
-    for b, block in enumerate(places):
-        table[b, : len(block)] = block
-    return Blocks(np.concatenate([plan.unit_bus, sensors.bus]), size, table, units)
+    return Blocks(np.concatenate([plan.unit_bus, sensors.bus]), size, place, units)

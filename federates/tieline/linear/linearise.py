@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import rsf2csf, schur
 
+from tieline.compiled import compiled
 from tieline.errors import InputError
 from tieline.grid.blocks import EMPTY, Blocks, cut
 from tieline.grid.models.base import SIGNALS
@@ -99,16 +100,8 @@ class LinearSystem:
     @cached_property
     def A_without_average(self) -> Floats:
         """Return (n, n) the state matrix when every stabiliser believes a constant average."""
-        n, place = len(self.states), self.blocks.place
-        by_state, by_input = self._with_stabilisers
-        taken = place != EMPTY
-        by_voltage = np.zeros((n, len(self._felt)))
-        by_voltage[place[taken]] = (by_input[:, :, [V_RE, V_IM]] @ self._block_voltages)[taken]
-        A = np.zeros((n, n))
-        A[:, self._felt] = by_voltage
-        pairs = taken[:, :, None] & taken[:, None, :]
-        rows, columns = np.broadcast_arrays(place[:, :, None], place[:, None, :])
-        A[rows[pairs], columns[pairs]] += by_state[pairs]
+        A = np.zeros((len(self.states), len(self.states)))
+        _assemble(self.blocks, *self._with_stabilisers, self._felt, self._block_voltages, A)
         return A
 
     @cached_property
@@ -292,6 +285,26 @@ class LinearSystem:
         given = np.einsum("ui,uik->uk", self.local.signals_by_input[PSS_OUT], z[: blocks.units])
         z[: blocks.units, V_S_IN] += np.where(self.severed[:, None], 0.0, given)
         return z, v
+
+
+@compiled
+def _assemble(
+    blocks: Blocks,
+    by_state: Floats,
+    by_input: Floats,
+    felt: NDArray[np.intp],
+    block_voltages: Floats,
+    A: Floats,
+) -> None:
+    """Write A (n, n): each block by its own states and, through its voltage, by those felt."""
+    for b in range(len(blocks.bus)):
+        place = blocks.place[b, : blocks.size[b]]
+        for slot, row in enumerate(place):
+            by_re, by_im = by_input[b, slot, V_RE], by_input[b, slot, V_IM]
+            for k, column in enumerate(felt):
+                A[row, column] = by_re * block_voltages[b, 0, k] + by_im * block_voltages[b, 1, k]
+            for other, column in enumerate(place):
+                A[row, column] += by_state[b, slot, other]
 
 
 def linearise(system: System, cut_pss: Collection[str] = ()) -> LinearSystem:
