@@ -34,6 +34,10 @@ SLACK = 0.03
 COINCIDE = 1e-6
 """Distance of eigenvalues that are taken for equal, relative to their distance from the shift."""
 
+ORTHOGONAL = 0.5**0.5
+"""A vector that a projection leaves longer than this part is orthogonal to rounding (Daniel, Gragg,
+Kaufman and Stewart, Mathematics of Computation 30, 1976)."""
+
 FIRST_CHECK, CHECK_EVERY = 48, 16
 """Sizes of the search space at which it is looked at."""
 
@@ -111,13 +115,15 @@ class _Space:
     def _append(self, image: Complexes) -> None:
         end = self.size + self.block
         basis, column = self.basis[:, :end], self.projected[:, self.size]
-        # Twice is enough to be orthogonal to rounding.
-        for _ in range(2):
+        length, left = np.inf, float(np.linalg.norm(image))
+        # Again where much was taken away; twice is enough to be orthogonal to rounding.
+        while left < ORTHOGONAL * length:
             share = (image.conj() @ basis).conj()
             image = image - basis @ share
             column[:end] += share
-        column[end] = np.linalg.norm(image)
-        self.basis[:, end] = image / column[end]
+            length, left = left, float(np.linalg.norm(image))
+        column[end] = left
+        self.basis[:, end] = image / left
         self.size += 1
 
     def known(self) -> tuple[Complexes, Complexes, float]:
