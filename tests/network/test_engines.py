@@ -7,6 +7,7 @@ from network.builders import joined
 from tieline.network.engine import Engine
 from tieline.network.ideal import ConstantDelay
 from tieline.network.packet import PacketEngine
+from tieline.network.queues import DropTail
 from tieline.network.spec import Destination, Link, Source
 
 SOURCES, DESTINATIONS = 3, 2
@@ -17,7 +18,9 @@ def packet_network() -> Engine:
     """Return three PMUs and two controllers around one link, no two delays alike."""
     sources = [Source(f"p{i}", i, "a", 1_000_000 * i) for i in range(SOURCES)]
     destinations = [Destination(f"c{j}", f"G{j}", j, "b", 3_000 * j) for j in range(DESTINATIONS)]
-    return PacketEngine(joined([Link("a", "b", 10**7, 2_000_000, 50)], sources, destinations), 1)
+    return PacketEngine(
+        joined([Link("a", "b", 10**7, 2_000_000, DropTail(50))], sources, destinations), 1
+    )
 
 
 ENGINES = {

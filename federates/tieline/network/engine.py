@@ -22,10 +22,10 @@ DROP = np.dtype(
         ("reason", "u1"),
     ]
 )
-"""A packet that ended at `dropped_ns`; `reason` is `QUEUE_FULL` or `LOSS`."""
+"""A packet that ended at `dropped_ns`; `reason` is `QUEUE_FULL`, `LOSS` or `LINK_DOWN`."""
 
-DELIVERED, QUEUE_FULL, LOSS = 0, 1, 2
-"""How a packet ends: at its controller, at a full queue, or corrupted on a link."""
+DELIVERED, QUEUE_FULL, LOSS, LINK_DOWN = 0, 1, 2, 3
+"""How a packet ends: at its controller, at a queue, corrupted on a link, or with its link."""
 
 NO_ARRIVALS = np.empty(0, ARRIVAL)
 NO_DROPS = np.empty(0, DROP)
@@ -53,15 +53,17 @@ class Counts:
     dropped_queue: int
     dropped_loss: int
     in_flight: int
+    dropped_down: int = 0
 
     def check(self, at_ns: int) -> None:
         """Raise CosimError unless every packet sent is accounted for."""
-        ended = self.delivered + self.dropped_queue + self.dropped_loss
+        ended = self.delivered + self.dropped_queue + self.dropped_loss + self.dropped_down
         if self.sent != ended + self.in_flight:
             raise CosimError(
                 f"the network lost count of packets at {at_ns} ns: {self.sent} sent, but "
                 f"{self.delivered} delivered, {self.dropped_queue} dropped at queues, "
-                f"{self.dropped_loss} lost on links and {self.in_flight} in flight"
+                f"{self.dropped_loss} lost on links, {self.dropped_down} lost with links and "
+                f"{self.in_flight} in flight"
             )
 
 
@@ -73,10 +75,11 @@ class LinkUse:
         origin, target: the nodes.
         rate_bps: its rate.
         packets, bytes: put on the link, those lost on it included, link-layer bytes included.
-        dropped_queue: packets that found the queue full.
+        dropped_queue: packets that found the queue full, or were dropped early.
         dropped_loss: packets that used the link and were lost at its end.
         busy_ns: time in transmission.
         max_queue: the most packets that waited, besides the one in transmission.
+        dropped_down: packets that were lost with the link, or came while it was down.
     """
 
     origin: str
@@ -88,6 +91,7 @@ class LinkUse:
     dropped_loss: int
     busy_ns: int
     max_queue: int
+    dropped_down: int = 0
 
 
 class Engine(Protocol):
