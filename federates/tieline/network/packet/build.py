@@ -237,4 +237,8 @@ def _connections(routes: Routes) -> tuple[Cells, Cells]:
 
 
 def _table(name: str, rows: Iterable[tuple[int, ...]]) -> Cells:
-    return np.array(list(rows), dtype=np.int64).reshape(-1, COLUMNS[name])
+    listed = list(rows)
+    table = np.zeros((len(listed), COLUMNS[name]), dtype=np.int64)
+    if listed:
+        table[:, : len(listed[0])] = listed
+    return table

@@ -248,7 +248,7 @@ class PacketEngine:
         while (stop := self._run(until_ns)) != kernel.DONE:
             if stop == kernel.NEEDS_DRAWS:
                 self._refill()
-            elif not kernel.has_room(self._memory.cells, self._memory.layout):
+            elif not kernel.events_with_room(self._memory.cells, self._memory.layout):
                 self._memory.grow()
 
     def _run(self, until_ns: int) -> int:

@@ -22,7 +22,8 @@ ARRIVAL, CROSS, FRAME, DEPARTURE, TIMER, REPLY = range(6)
 (sequence times sources, plus the source); a port with a server ends a transmission; a connection's
 timer ends; a flow sends the reply to a request."""
 
-KINDS = 8
+KIND_BITS = 3
+KINDS = 1 << KIND_BITS
 
 _STREAM = COLUMNS["streams"]
 
@@ -30,7 +31,7 @@ _STREAM = COLUMNS["streams"]
 @compiled
 def item_of(kind: int, number: int) -> int:
     """Return the item of an event."""
-    return KINDS * number + kind
+    return (number << KIND_BITS) + kind
 
 
 @compiled

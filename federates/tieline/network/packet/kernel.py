@@ -13,6 +13,7 @@ from tieline.network.packet.events import (
     CROSS,
     DEPARTURE,
     FRAME,
+    KIND_BITS,
     KINDS,
     REPLY,
     TIMER,
@@ -83,14 +84,18 @@ def run(until_ns: int, cells: Cells, at: Layout) -> int:
         records may come than the tables hold) or `NEEDS_DRAWS` (a stream has used up a chunk). The
         caller helps and calls again.
     """
+    safe = 0
     while cells[at.control + HEAP_SIZE] > 0 and cells[at.heap + TIME] <= until_ns:
         if cells[at.control + WANTS_DRAWS] != 0:
             return NEEDS_DRAWS
-        if not has_room(cells, at):
-            return NEEDS_ROOM
+        if safe == 0:
+            safe = events_with_room(cells, at)
+            if safe == 0:
+                return NEEDS_ROOM
+        safe -= 1
         now = cells[at.heap + TIME]
         item = cells[at.heap + ITEM]
-        kind, number = item % KINDS, item // KINDS
+        kind, number = item & (KINDS - 1), item >> KIND_BITS
         if kind == ARRIVAL:
             _arrive(now, number, cells, at)
         elif kind == CROSS:
@@ -117,14 +122,15 @@ def announce(times_ns: Cells, items: Cells, base_order: int, cells: Cells, at: L
 
 
 @compiled
-def has_room(cells: Cells, at: Layout) -> bool:
-    """Return whether the next event can be processed, whatever it is."""
-    return (
-        cells[at.control + FREE_PACKETS] >= at.most_packets
-        and cells[at.control + HEAP_SIZE] + 2 * at.most_packets <= at.capacity
-        and cells[at.control + ENDED] + at.most_packets <= at.capacity
-        and cells[at.control + TAPPED] + at.most_packets <= at.capacity
+def events_with_room(cells: Cells, at: Layout) -> int:
+    """Return how many events can be processed for certain, whatever they are."""
+    free = min(
+        cells[at.control + FREE_PACKETS],
+        (at.capacity - cells[at.control + HEAP_SIZE]) >> 1,
+        at.capacity - cells[at.control + ENDED],
+        at.capacity - cells[at.control + TAPPED],
     )
+    return free // at.most_packets
 
 
 @compiled

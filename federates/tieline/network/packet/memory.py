@@ -18,6 +18,10 @@ Cells = NDArray[np.int64]
 MAX_PACKETS = 1 << 22
 """Packets, or pending events, that are ever held: about 500 MB. Queues bound them far below."""
 
+LINE = 8
+"""Cells of a line of the processor's cache: tables begin with one, and the rows that every packet
+meets fill whole ones."""
+
 NONE = -1
 """No stream, no row, no slot."""
 
@@ -95,10 +99,10 @@ IS_HERE, FRAME = range(2)
 
 COLUMNS = {
     "control": 6,
-    "ports": 31,
+    "ports": 32,
     "classes": 8,
     "red": 7,
-    "hops": 6,
+    "hops": 8,
     "forks": 1,
     "members": 1,
     "flows": 5,
@@ -110,7 +114,7 @@ COLUMNS = {
     "streams": 1 + 2 * CHUNK,
     "ring": 2,
     "heap": 3,
-    "packets": 6,
+    "packets": 8,
     "free": 1,
     "ended": 4,
     "taps": 6,
@@ -236,6 +240,8 @@ class Memory:
         size = 0
         for name, columns in COLUMNS.items():
             starts[name] = size
-            size += self._rows[name] * columns
-        self.cells: Cells = np.zeros(size, dtype=np.int64)
+            size += -(-self._rows[name] * columns // LINE) * LINE
+        whole: Cells = np.zeros(size + LINE, dtype=np.int64)
+        aligned = -(whole.ctypes.data // whole.itemsize) % LINE
+        self.cells = whole[aligned : aligned + size]
         self.layout = Layout(**starts, capacity=self._rows["heap"], **self._bounds)

@@ -104,11 +104,9 @@ def transmit(now: int, slot: int, hop: int, cells: Cells, at: Layout) -> int:
         size = link_bytes(slot, cells, at)
         service_ns = _service_ns(size, port, cells)
     start_ns = max(now, cells[port + FREE_AT])
-    if start_ns > now:
-        if _waiting(now, port, cells, at) >= cells[port + QUEUE]:
-            cells[port + QUEUE_DROPS] += 1
-            return DROPPED_AT_QUEUE
-        _wait(start_ns, size, port, cells, at)
+    if start_ns > now and not _queue(now, start_ns, size, port, cells, at):
+        cells[port + QUEUE_DROPS] += 1
+        return DROPPED_AT_QUEUE
     _occupy(start_ns, service_ns, size, port, cells)
     return start_ns + service_ns + cells[port + PROPAGATION]
 
@@ -158,8 +156,34 @@ def _occupy(start_ns: int, service_ns: int, size: int, port: int, cells: Cells) 
 
 
 @compiled
+def _queue(now: int, start_ns: int, size: int, port: int, cells: Cells, at: Layout) -> bool:
+    """Let a packet wait at a plain port until `start_ns`; false if the queue is full.
+
+    It is `_waiting` and `_wait` in one, without the count of bytes: most packets come here.
+    """
+    room = cells[port + QUEUE]
+    ring = at.ring + _RING * cells[port + RING]
+    head = cells[port + RING_HEAD]
+    waiting = cells[port + WAITING]
+    while waiting > 0 and cells[ring + _RING * head] <= now:
+        head = head + 1 if head + 1 < room else 0
+        waiting -= 1
+    is_accepted = waiting < room
+    if is_accepted:
+        tail = head + waiting
+        row = ring + _RING * (tail if tail < room else tail - room)
+        cells[row] = start_ns
+        cells[row + 1] = size
+        waiting += 1
+        cells[port + MAX_QUEUE] = max(cells[port + MAX_QUEUE], waiting)
+    cells[port + RING_HEAD] = head
+    cells[port + WAITING] = waiting
+    return is_accepted
+
+
+@compiled
 def _waiting(now: int, port: int, cells: Cells, at: Layout) -> int:
-    """Return how many packets wait at a plain port."""
+    """Return how many packets wait at a port without a server."""
     ring = at.ring + _RING * cells[port + RING]
     room = cells[port + QUEUE]
     head = cells[port + RING_HEAD]
@@ -175,7 +199,7 @@ def _waiting(now: int, port: int, cells: Cells, at: Layout) -> int:
 
 @compiled
 def _wait(start_ns: int, size: int, port: int, cells: Cells, at: Layout) -> None:
-    """Note a packet that waits at a plain port until `start_ns`; there must be room for it."""
+    """Note a packet that waits there until `start_ns`; there must be room for it."""
     room = cells[port + QUEUE]
     tail = cells[port + RING_HEAD] + cells[port + WAITING]
     row = at.ring + _RING * (cells[port + RING] + (tail if tail < room else tail - room))
