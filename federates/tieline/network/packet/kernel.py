@@ -5,7 +5,7 @@ from its tables in the order in which it needs them. It therefore computes the s
 and however its caller cuts the time into pieces.
 """
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled, inlined
 from tieline.network.engine import DELIVERED, LOSS
 from tieline.network.packet import tcp
 from tieline.network.packet.events import (
@@ -133,7 +133,7 @@ def events_with_room(cells: Cells, at: Layout) -> int:
     return free // at.most_packets
 
 
-@compiled
+@inlined
 def _arrive(now: int, slot: int, cells: Cells, at: Layout) -> None:
     """A packet reaches the end of a link, as the first event of the heap."""
     packet = at.packets + _PACKET * slot

@@ -6,7 +6,7 @@ A port with a server (priorities, round robin, half duplex) has an event at each
 transmission, because only then it is known which packet is next.
 """
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled, inlined
 from tieline.network.packet.events import DEPARTURE, item_of, next_order, push_event, take
 from tieline.network.packet.memory import (
     BUSY,
@@ -87,7 +87,7 @@ _CLASS, _PACKET, _TAP, _RING = (COLUMNS[name] for name in ("classes", "packets",
 _NS_PER_S = 1_000_000_000
 
 
-@compiled
+@inlined
 def transmit(now: int, slot: int, hop: int, cells: Cells, at: Layout) -> int:
     """Return when the packet in `slot` reaches the end of the link, or one of the above.
 
@@ -146,7 +146,7 @@ def _service_ns(size: int, port: int, cells: Cells) -> int:
     return (16 * size * _NS_PER_S + rate) // (2 * rate)
 
 
-@compiled
+@inlined
 def _occupy(start_ns: int, service_ns: int, size: int, port: int, cells: Cells) -> None:
     """Book the link for a packet."""
     cells[port + FREE_AT] = start_ns + service_ns
@@ -155,7 +155,7 @@ def _occupy(start_ns: int, service_ns: int, size: int, port: int, cells: Cells) 
     cells[port + BUSY] += service_ns
 
 
-@compiled
+@inlined
 def _queue(now: int, start_ns: int, size: int, port: int, cells: Cells, at: Layout) -> bool:
     """Let a packet wait at a plain port until `start_ns`; false if the queue is full.
 
