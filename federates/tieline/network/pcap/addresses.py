@@ -55,6 +55,7 @@ TCP and fragments need them. `fragment_bytes` are the bytes after the IPv4 heade
 but the last, a multiple of 8, and 0 for a flow whose packets are never fragmented.
 """
 
+_MOST_PAYLOAD = 0xFFFF - 20 - 8
 _MOST_HOSTS = (1 << 16) - 1
 _MOST_CROSS_FLOWS = (1 << 22) - 1
 _NODE, _PMU, _CONTROLLER = (int(IPv4Address(f"10.{kind}.0.1")) for kind in range(3))
@@ -73,14 +74,16 @@ class AddressPlan:
         nodes: (nodes,) uint32.
         sources: (sources,) uint32, of the PMUs.
         destinations: (destinations,) uint32, of the controllers.
+        groups: (sources,) uint32, of the PMUs' multicast streams; (0,) where flows are unicast.
         flows: (flows,) of `FLOW_ADDRESS`: the PMU flows, then the cross flows. A caller may change
-            a column, such as `dscp`, before the first packet is written.
+            a column, such as `dscp`, before a capture is opened.
         pmu_flows: how many of them are PMU flows.
     """
 
     nodes: NDArray[np.uint32]
     sources: NDArray[np.uint32]
     destinations: NDArray[np.uint32]
+    groups: NDArray[np.uint32]
     flows: NDArray[np.void]
     pmu_flows: int
 
@@ -89,7 +92,10 @@ class AddressPlan:
         columns = {
             "protocol": (np.isin(self.flows["protocol"], (UDP, TCP)), f"{UDP} or {TCP}"),
             "dscp": (self.flows["dscp"] < 64, "0 to 63"),
-            "payload_bytes": (self.flows["payload_bytes"] >= 0, "at least 0"),
+            "payload_bytes": (
+                (self.flows["payload_bytes"] >= 0) & (self.flows["payload_bytes"] <= _MOST_PAYLOAD),
+                f"0 to {_MOST_PAYLOAD}",
+            ),
             "fragment_bytes": (
                 (self.flows["fragment_bytes"] >= 0) & (self.flows["fragment_bytes"] % 8 == 0),
                 "a multiple of 8, or 0",
@@ -136,13 +142,14 @@ def address_plan(
     of_pmus["source_port"] = C37118_TCP_PORT if protocol == TCP else C37118_UDP_PORT
     of_pmus["target_port"] = DYNAMIC_PORT if protocol == TCP else C37118_UDP_PORT
     of_pmus["payload_bytes"] = payload_bytes
+    groups = _addresses(_GROUP, len(spec.sources) if is_multicast else 0)
     if is_multicast:
-        of_pmus["target_ip"] = _GROUP + source
+        of_pmus["target_ip"] = groups[source]
         _, first, which = np.unique(source, return_index=True, return_inverse=True)
         of_pmus["stream"] = first[which]
     _fill_cross(flows[pmu_flows:], spec)
     nodes = _addresses(_NODE, len(spec.nodes))
-    return AddressPlan(nodes, sources, destinations, flows, pmu_flows)
+    return AddressPlan(nodes, sources, destinations, groups, flows, pmu_flows)
 
 
 def mac_bytes(ips: ArrayLike) -> NDArray[np.uint8]:
@@ -160,9 +167,8 @@ def hosts_text(spec: NetworkSpec, plan: AddressPlan) -> str:
     lines += _lines(plan.destinations, spec.destinations)
     lines += _lines(cross["source_ip"], spec.cross_flows, "from-")
     lines += _lines(cross["target_ip"], spec.cross_flows, "to-")
-    if len(plan.flows) and plan.flows["target_ip"][0] == _GROUP + spec.flows[0].source:
-        groups = _addresses(_GROUP, len(plan.sources))
-        lines += _lines(groups, spec.sources, "group-")
+    if len(plan.groups):
+        lines += _lines(plan.groups, spec.sources, "group-")
     return "".join(f"{line}\n" for line in lines)
 
 

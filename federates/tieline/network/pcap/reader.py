@@ -71,8 +71,8 @@ def read_pcap(path: Path) -> PacketTrace:
         raise InputError(
             f"{path}: record {len(offsets) + 1} is cut off: the file ends at byte {len(data)}"
         )
-    spans = offsets[:, np.newaxis] + np.arange(_HEADER_BYTES)
-    headers = data[spans].view(RECORD_HEADER.newbyteorder(order)).reshape(len(offsets))
+    rows = np.lib.stride_tricks.sliding_window_view(data, _HEADER_BYTES)[offsets]
+    headers = rows.view(RECORD_HEADER.newbyteorder(order)).reshape(len(offsets))
     times_ns = _times_ns(path, headers, ns_per_tick)
     captured = headers["captured_bytes"].astype(np.int64)
     starts, is_ip = _ip_starts(data, offsets + _HEADER_BYTES, captured, link_type)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tieline.compiled import compiled
 from tieline.errors import CosimError, InputError
 from tieline.units import NS_PER_S
 
@@ -123,8 +124,7 @@ class PcapWriter:
         block = np.empty(int(ends[-1]), np.uint8)
         for places, frames in groups:
             records = self._records(times_ns[places], frames)
-            starts = ends[places] - records.shape[1]
-            block[starts[:, np.newaxis] + np.arange(records.shape[1])] = records
+            _copy(records, ends[places] - records.shape[1], block)
         return block
 
     def _records(self, times_ns: NDArray[np.int64], frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -134,3 +134,11 @@ class PcapWriter:
         headers["seconds"] = seconds + self._epoch_s
         headers["captured_bytes"] = headers["bytes"] = size
         return np.hstack([headers.view(np.uint8).reshape(n, RECORD_HEADER.itemsize), frames])
+
+
+@compiled
+def _copy(rows: NDArray[np.uint8], starts: NDArray[np.int64], block: NDArray[np.uint8]) -> None:
+    """Copy rows (n, size) to where each begins (n,) in a block."""
+    size = rows.shape[1]
+    for i in range(len(starts)):
+        block[starts[i] : starts[i] + size] = rows[i]
