@@ -41,3 +41,12 @@ class NetworkSettings(BaseModel):
         1.0, ge=0, le=20, description="factor on the rate of all cross traffic; 0 turns it off"
     )
     record_packets: StrictBool = Field(False, description="write packets.parquet, one row a packet")
+    series_window: Seconds | None = Field(
+        0.1,
+        ge=1e-3,
+        le=10,
+        description=(
+            "length of the windows of link_series.parquet and controller_series.parquet, s; none "
+            "writes neither"
+        ),
+    )

@@ -19,6 +19,7 @@ from tieline.network.engine import (
 )
 from tieline.network.packet import kernel
 from tieline.network.packet.build import Supplies, Traces, laid_out
+from tieline.network.packet.counters import read_counters
 from tieline.network.packet.draws import jitters
 from tieline.network.packet.memory import (
     ARRIVED,
@@ -80,6 +81,7 @@ class PacketEngine:
         self._rows: list[NDArray[np.int64]] = []
         self._sent = 0
         self._ended = np.zeros(3, dtype=np.int64)
+        self._max_queue = np.zeros(len(spec.ports), dtype=np.int64)
         self._start_cross_flows()
 
     def send(self, measured_ns: int, sources: NDArray[np.int64], sequence: int) -> None:
@@ -127,6 +129,7 @@ class PacketEngine:
     def links(self) -> list[LinkUse]:
         """Return what each link carried up to the last `run_until`, direction by direction."""
         rows = self._memory.table("ports").tolist()
+        before = self._max_queue.tolist()
         return [
             LinkUse(
                 origin,
@@ -137,10 +140,19 @@ class PacketEngine:
                 dropped_queue=rows[port][QUEUE_DROPS],
                 dropped_loss=rows[port][LOSS_DROPS],
                 busy_ns=rows[port][BUSY] - max(0, rows[port][FREE_AT] - self._now_ns),
-                max_queue=rows[port][MAX_QUEUE],
+                max_queue=max(before[port], rows[port][MAX_QUEUE]),
             )
             for (origin, target), port in self._spec.ports.items()
         ]
+
+    def link_counters(self) -> NDArray[np.void]:
+        """Return the counters of each link's directions, and begin a new span for `max_queue`."""
+        ports = self._memory.table("ports")
+        memory = self._memory
+        counters = read_counters(self._now_ns, len(ports), memory.cells, memory.layout)
+        np.maximum(self._max_queue, counters["max_queue"], out=self._max_queue)
+        ports[:, MAX_QUEUE] = counters["queue"]
+        return counters
 
     def _start_cross_flows(self) -> None:
         """Announce the first packet of each cross flow."""
