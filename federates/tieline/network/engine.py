@@ -158,6 +158,9 @@ class Engine(Protocol):
         Reading them begins a new span for `max_queue`; nothing else changes.
         """
 
+    def close(self) -> None:
+        """Let go of what the engine holds outside Python; nothing is asked of it afterwards."""
+
 
 def check_not_late(enters_ns: int, now_ns: int) -> None:
     """Raise CosimError unless a frame can still do what it does first, at `enters_ns`."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tieline.cosim.interfaces import DELIVERY, NETWORK, Clock, DeliveryBundle, FrameBundle
 from tieline.errors import CosimError, TimeContractBroken
 from tieline.network.engine import Engine, Outcome, joined
-from tieline.network.ideal import ConstantDelay
+from tieline.network.linkless import open_without_links
 from tieline.network.packet import PacketEngine
 from tieline.network.recorder import Recorder
 from tieline.network.settings import NetworkSettings
@@ -33,7 +33,8 @@ def open_participant(run: dict[str, Any], folder: Path) -> "NetworkParticipant":
     if is_packet:
         engine = PacketEngine(spec, run["seed"])
     else:
-        engine = ConstantDelay(len(spec.destinations), spec.lookahead_ns)
+        sites = (run["sources"], run["destinations"])
+        engine = open_without_links(settings, spec, *sites, run["seed"])
     clock = Clock(**run["clock"])
     window_s = settings.series_window
     window_ns = None if window_s is None else seconds_to_ns(window_s)
@@ -85,10 +86,12 @@ class NetworkParticipant:
     def finish(self) -> None:
         """Write the tables."""
         self._recorder.write()
+        self._engine.close()
 
     def abort(self, reason: str) -> None:
         """Write the tables as far as the run came."""
         self._recorder.write()
+        self._engine.close()
 
     def _carry(self, k: int) -> bytes:
         """Run the network over [t_k, t_k+1] and return its deliveries; nothing after the end."""

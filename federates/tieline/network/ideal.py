@@ -78,3 +78,6 @@ class ConstantDelay:
     def link_counters(self) -> NDArray[np.void]:
         """Return nothing: there are no links."""
         return NO_LINKS
+
+    def close(self) -> None:
+        """Do nothing: there is nothing to let go of."""

@@ -2,9 +2,60 @@
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictFloat
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictFloat, model_validator
 
+from tieline.network.schema import JitterEntry
 from tieline.units import Seconds
+
+MAX_DELAY_S = 10.0
+"""Longest delay that a setting or a trace may have, s."""
+
+
+class PathSettings(BaseModel):
+    """The delays of one path of the empirical engine."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    source: str = Field(description="PMU, by name or bus", coerce_numbers_to_str=True)
+    destination: str = Field(description="controller, by name or unit")
+    distribution: JitterEntry = Field(description="distribution of the delays")
+    offset: Seconds = Field(0.0, ge=0, le=MAX_DELAY_S, description="added to each delay, s")
+
+
+class EmpiricalSettings(BaseModel):
+    """Where the empirical engine takes the delay of each packet from."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    trace: str | None = Field(
+        None,
+        description=(
+            "CSV file of measured delays: one column delay_s, or source, destination and delay_s"
+        ),
+    )
+    draw: Literal["at_random", "in_turn"] = Field(
+        "at_random", description="which measured delay a packet gets: any, or the next of its path"
+    )
+    distribution: JitterEntry | None = Field(
+        None, description="distribution of the delays of all paths, in place of a trace"
+    )
+    offset: Seconds = Field(
+        0.0, ge=0, le=MAX_DELAY_S, description="added to each delay of the distribution, s"
+    )
+    paths: tuple[PathSettings, ...] = Field(
+        (), description="paths with a distribution of their own, in place of that of all"
+    )
+    keep_order: StrictBool = Field(
+        True, description="a packet never overtakes the one before it on its path"
+    )
+
+    @model_validator(mode="after")
+    def _has_one_origin(self) -> "EmpiricalSettings":
+        if (self.trace is None) == (self.distribution is None):
+            raise ValueError("must have either a 'trace' or a 'distribution'")
+        if self.trace is not None and (self.offset or self.paths):
+            raise ValueError("'offset' and 'paths' go with a 'distribution', not with a 'trace'")
+        return self
 
 
 class NetworkSettings(BaseModel):
@@ -12,12 +63,18 @@ class NetworkSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    engine: Literal["ideal", "constant", "packet"] = Field(
+    engine: Literal["ideal", "constant", "empirical", "helics-filters", "packet"] = Field(
         "packet",
-        description="ideal: no delay; constant: one delay for all; packet: a simulated network",
+        description=(
+            "ideal: no delay; constant: one delay for all; empirical: drawn or measured delays; "
+            "helics-filters: HELICS's own delay and random_drop; packet: a simulated network"
+        ),
     )
     delay: Seconds | None = Field(
-        None, ge=0, le=10, description="combined delay of the constant engine, s"
+        None,
+        ge=0,
+        le=10,
+        description="combined delay of the engines constant and helics-filters, s",
     )
     topology: str = Field(
         "case", description="'case' for the case's own network.yaml, or the path of a topology file"
@@ -35,10 +92,16 @@ class NetworkSettings(BaseModel):
         None,
         ge=0,
         lt=1,
-        description="loss probability of each link, in place of the topology's own",
+        description=(
+            "loss probability of each link, in place of the topology's own; without links, of each "
+            "packet"
+        ),
     )
     cross_traffic: StrictFloat = Field(
         1.0, ge=0, le=20, description="factor on the rate of all cross traffic; 0 turns it off"
+    )
+    empirical: EmpiricalSettings | None = Field(
+        None, description="where the empirical engine takes its delays from"
     )
     record_packets: StrictBool = Field(False, description="write packets.parquet, one row a packet")
     series_window: Seconds | None = Field(

@@ -154,6 +154,9 @@ class PacketEngine:
         ports[:, MAX_QUEUE] = counters["queue"]
         return counters
 
+    def close(self) -> None:
+        """Do nothing: there is nothing to let go of."""
+
     def _start_cross_flows(self) -> None:
         """Announce the first packet of each cross flow."""
         streams = self._memory.table("streams")
