@@ -1,5 +1,6 @@
 """What every network engine does: takes frames at instants, gives deliveries and drops in order."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -24,11 +25,27 @@ DROP = np.dtype(
 )
 """A packet that ended at `dropped_ns`; `reason` is `QUEUE_FULL`, `LOSS` or `LINK_DOWN`."""
 
+LINK_COUNTER = np.dtype(
+    [
+        ("packets", "<i8"),
+        ("bytes", "<i8"),
+        ("busy_ns", "<i8"),
+        ("dropped_queue", "<i8"),
+        ("dropped_loss", "<i8"),
+        ("dropped_down", "<i8"),
+        ("queue", "<i8"),
+        ("max_queue", "<i8"),
+    ]
+)
+"""What one direction of one link has carried since the start, as `LinkUse`; `queue` is the packets
+that wait now, and `max_queue` the most that waited since the counters were last read."""
+
 DELIVERED, QUEUE_FULL, LOSS, LINK_DOWN = 0, 1, 2, 3
 """How a packet ends: at its controller, at a queue, corrupted on a link, or with its link."""
 
 NO_ARRIVALS = np.empty(0, ARRIVAL)
 NO_DROPS = np.empty(0, DROP)
+NO_LINKS = np.empty(0, LINK_COUNTER)
 
 
 @dataclass(frozen=True)
@@ -42,6 +59,16 @@ class Outcome:
 
     arrivals: NDArray[np.void]
     drops: NDArray[np.void]
+
+
+def joined(outcomes: Sequence[Outcome]) -> Outcome:
+    """Return the outcomes of spans that follow one another as one; at least one is given."""
+    if len(outcomes) == 1:
+        return outcomes[0]
+    return Outcome(
+        np.concatenate([outcome.arrivals for outcome in outcomes]),
+        np.concatenate([outcome.drops for outcome in outcomes]),
+    )
 
 
 @dataclass(frozen=True)
@@ -129,6 +156,15 @@ class Engine(Protocol):
 
     def links(self) -> list[LinkUse]:
         """Return what each link carried, direction by direction; none without a topology."""
+
+    def link_counters(self) -> NDArray[np.void]:
+        """Return (directions,) of `LINK_COUNTER` in the order of `links`, at the last `run_until`.
+
+        Reading them begins a new span for `max_queue`; nothing else changes.
+        """
+
+    def close(self) -> None:
+        """Let go of what the engine holds outside Python; nothing is asked of it afterwards."""
 
 
 def check_not_late(enters_ns: int, now_ns: int) -> None:

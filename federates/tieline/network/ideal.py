@@ -9,6 +9,7 @@ from tieline.network.engine import (
     ARRIVAL,
     NO_ARRIVALS,
     NO_DROPS,
+    NO_LINKS,
     Counts,
     LinkUse,
     Outcome,
@@ -73,3 +74,10 @@ class ConstantDelay:
     def links(self) -> list[LinkUse]:
         """Return nothing: there are no links."""
         return []
+
+    def link_counters(self) -> NDArray[np.void]:
+        """Return nothing: there are no links."""
+        return NO_LINKS
+
+    def close(self) -> None:
+        """Do nothing: there is nothing to let go of."""

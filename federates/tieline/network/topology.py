@@ -7,6 +7,7 @@ from pathlib import Path
 from tieline.errors import InputError
 from tieline.network.entries import Entries, Sites, jitter_of
 from tieline.network.events import changes_of, rerouted
+from tieline.network.linkless import least_delay_without_links_ns
 from tieline.network.routing import Router, Routing
 from tieline.network.settings import NetworkSettings
 from tieline.network.spec import (
@@ -63,10 +64,8 @@ def network_spec(
     """
     if topology is not None:
         return read_topology(topology, sources, destinations, settings)
-    if settings.engine == "constant" and settings.delay is None:
-        raise InputError("network.delay must be given with network.engine constant")
-    delay_s = settings.delay if settings.engine == "constant" else None
-    return direct_spec(sources, destinations, seconds_to_ns(delay_s or 0.0))
+    least_ns = least_delay_without_links_ns(settings, sources, destinations)
+    return direct_spec(sources, destinations, least_ns)
 
 
 def mean_unloaded_delay_ns(spec: NetworkSpec) -> float:

@@ -20,6 +20,7 @@ from tieline.network.engine import (
 )
 from tieline.network.packet import kernel, tcp
 from tieline.network.packet.build import Supplies, laid_out
+from tieline.network.packet.counters import read_counters
 from tieline.network.packet.events import CROSS, FRAME, KINDS
 from tieline.network.packet.memory import (
     ARRIVED,
@@ -104,6 +105,7 @@ class PacketEngine:
         self._sent = 0
         self._ended = np.zeros(4, dtype=np.int64)
         self._tapped: list[NDArray[np.int64]] = []
+        self._max_queue = np.zeros(len(spec.ports), dtype=np.int64)
         self._start_cross_flows()
 
     def send(self, measured_ns: int, sources: NDArray[np.int64], sequence: int) -> None:
@@ -155,6 +157,7 @@ class PacketEngine:
     def links(self) -> list[LinkUse]:
         """Return what each link carried up to the last `run_until`, direction by direction."""
         rows = self._memory.table("ports").tolist()
+        before = self._max_queue.tolist()
         return [
             LinkUse(
                 origin,
@@ -165,7 +168,7 @@ class PacketEngine:
                 dropped_queue=rows[port][QUEUE_DROPS],
                 dropped_loss=rows[port][LOSS_DROPS],
                 busy_ns=rows[port][BUSY] - max(0, rows[port][FREE_AT] - self._now_ns),
-                max_queue=rows[port][MAX_QUEUE],
+                max_queue=max(before[port], rows[port][MAX_QUEUE]),
                 dropped_down=rows[port][DOWN_DROPS],
             )
             for (origin, target), port in self._spec.ports.items()
@@ -186,6 +189,18 @@ class PacketEngine:
         for column, name in enumerate(TAP.names or ()):
             records[name] = due[:, column]
         return records
+
+    def link_counters(self) -> NDArray[np.void]:
+        """Return the counters of each link's directions, and begin a new span for `max_queue`."""
+        ports = self._memory.table("ports")
+        memory = self._memory
+        counters = read_counters(self._now_ns, len(ports), memory.cells, memory.layout)
+        np.maximum(self._max_queue, counters["max_queue"], out=self._max_queue)
+        ports[:, MAX_QUEUE] = counters["queue"]
+        return counters
+
+    def close(self) -> None:
+        """Do nothing: there is nothing to let go of."""
 
     def _start_cross_flows(self) -> None:
         """Announce the first packet of each cross flow."""
