@@ -20,7 +20,11 @@ class NetworkSettings(BaseModel):
         None, ge=0, le=10, description="combined delay of the constant engine, s"
     )
     topology: str = Field(
-        "case", description="'case' for the case's own network.yaml, or the path of a topology file"
+        "case",
+        description=(
+            "'case' for the case's own network.yaml, the name of another topology of the case, "
+            "such as wan, or the path of a topology file"
+        ),
     )
     mean_delay: Seconds | None = Field(
         None,
