@@ -165,18 +165,25 @@ def _case_folder(name: str, beside: Path) -> Path:
         raise InputError(f"case: {error}{near(name, known)}") from error
 
 
+_NOT_BY_NAME = ("case", "network")
+"""Files of a case that are no further topology."""
+
+
 def _topology(experiment: Experiment, folder: Path, beside: Path) -> Path | None:
     if experiment.network.engine != "packet":
         return None
     name = experiment.network.topology
-    places = [folder / "network.yaml"] if name == "case" else [beside / name, Path(name)]
-    for path in places:
+    places = [beside / name, Path(name), folder / f"{name}.yaml", folder / name]
+    for path in [folder / "network.yaml"] if name == "case" else places:
         if path.is_file():
             return path.resolve()
-    raise InputError(
-        f"network.topology {'of the case' if name == 'case' else repr(name)} is missing:"
-        f" no file {places[0]}"
-    )
+    if name == "case":
+        raise InputError(
+            f"network.topology of the case is missing: no file {folder / 'network.yaml'}"
+        )
+    own = sorted(path.stem for path in folder.glob("*.yaml") if path.stem not in _NOT_BY_NAME)
+    known = f" (the case has: {', '.join(['case', *own])}{near(name, own)})"
+    raise InputError(f"network.topology {name!r} is missing: no file {places[0]}{known}")
 
 
 def _folder_hash(folder: Path) -> str:

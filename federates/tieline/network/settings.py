@@ -79,7 +79,11 @@ class NetworkSettings(BaseModel):
         description="combined delay of the engines constant and helics-filters, s",
     )
     topology: str = Field(
-        "case", description="'case' for the case's own network.yaml, or the path of a topology file"
+        "case",
+        description=(
+            "'case' for the case's own network.yaml, the name of another topology of the case, "
+            "such as wan, or the path of a topology file"
+        ),
     )
     mean_delay: Seconds | None = Field(
         None,
