@@ -177,7 +177,7 @@ def _fill_cross(flows: NDArray[np.void], spec: NetworkSpec) -> None:
     flows["target_ip"] = _addresses(_RECEIVER, len(flows))
     flows["source_port"] = flows["target_port"] = DYNAMIC_PORT
     flows["protocol"] = UDP
-    flows["payload_bytes"] = [flow.payload_bytes for flow in spec.cross_flows]
+    flows["payload_bytes"] = [flow.traffic.payload_bytes for flow in spec.cross_flows]
 
 
 def _addresses(first: int, count: int) -> NDArray[np.uint32]:
