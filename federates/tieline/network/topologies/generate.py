@@ -15,6 +15,8 @@ from tieline.network.topologies.stations import Corridor, Station, corridors_of,
 
 MOST_NODES = 100_000
 
+USUAL_DEGREE = 3.0
+
 STATIONS = (
     "nodes: substations. Buses joined by a transformer without resistance, or by a branch of at "
     "most 0.0011 pu reactance, are one station. A station bears the number of its PMU's bus, or "
@@ -114,10 +116,12 @@ def _joined(
         pairs = set(ring(places, range(len(places.names))))
         text = "links: a ring through all nodes, a short tour."
     else:
-        pairs = mesh(places, options.degree)
+        most = len(places.names) - 1
+        degree = min(USUAL_DEGREE, most) if options.degree is None else options.degree
+        pairs = mesh(places, degree)
         text = (
             "links: a ring through all nodes, a short tour, and the shortest further links up to "
-            f"{options.degree:g} a node on average."
+            f"{degree:g} a node on average."
         )
     links = links_between(places, sorted(pairs), options.links)
     return Draft((*head, text), options.links, nodes, links)

@@ -59,7 +59,7 @@ def levels(
             "other in the core, either way, planning data and many users. Rates count payload, UDP "
             "and IPv4 headers; all are chosen."
         )
-    if places.ends().size:
+    if places.has_corridors and len(nodes) > 2:
         sentences.append(_cuts_text([node.name for node in nodes], links))
     return Draft(tuple(sentences), options.links, nodes, links, cross)
 

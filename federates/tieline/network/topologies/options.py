@@ -18,7 +18,7 @@ class Options:
     Attributes:
         links: what holds for every link.
         hub: of a star.
-        degree: of a mesh.
+        degree: of a mesh, or None for 3, as far as there are so many others.
         regions: of a hierarchical network, or None for a case's areas or `nodes_per_region`.
         ring_size: routers in each regional ring, or None for the square root of the members.
         core: one of `CORES`.
@@ -29,7 +29,7 @@ class Options:
 
     links: LinkDefaults = field(default_factory=LinkDefaults)
     hub: str | None = None
-    degree: float = 3.0
+    degree: float | None = None
     regions: int | None = None
     ring_size: int | None = None
     core: str = "ring"

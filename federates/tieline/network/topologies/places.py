@@ -61,10 +61,12 @@ class Places(Protocol):
     Attributes:
         names: of each place.
         xy_km: (n, 2), for drawing and for cutting regions.
+        has_corridors: whether ways follow corridors, which they may share.
     """
 
     names: tuple[str, ...]
     xy_km: Floats
+    has_corridors: bool
 
     def km(self, at: int, among: Integers) -> Floats:
         """Return (m,) the distances from one place to some places (m,)."""
@@ -87,6 +89,8 @@ class Land:
         xy_km: (n, 2).
         factor: cable length over straight distance.
     """
+
+    has_corridors = False
 
     def __init__(self, names: Sequence[str], xy_km: Floats, factor: float = ROUTE_FACTOR) -> None:
         self.names = tuple(names)
@@ -129,6 +133,8 @@ class Lines:
         corridors: they join all stations.
         xy_km: (n, 2).
     """
+
+    has_corridors = True
 
     def __init__(self, names: Sequence[str], corridors: Sequence[Corridor], xy_km: Floats) -> None:
         self.names = tuple(names)

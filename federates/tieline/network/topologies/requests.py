@@ -81,11 +81,10 @@ def options(kind: str, links: LinkDefaults, told: Mapping[str, Any]) -> Options:
     ]
     if findings:
         raise InputError(findings)
-    degree = told["degree"]
     return Options(
         links=links,
         hub=told["hub"],
-        degree=3.0 if degree is None else degree,
+        degree=told["degree"],
         regions=told["regions"],
         ring_size=told["ring-size"],
         core=told["core"] or "ring",
