@@ -82,7 +82,7 @@ class Entries:
         self._added = Findings(Document(document.path, own, {}), "network.")
         self._findings.keys(self._data, (), SECTIONS, required=("nodes", "links"))
         self.nodes = self._read_nodes()
-        self._names = [node.name for node in self.nodes]
+        self._names = dict.fromkeys(node.name for node in self.nodes)
         self._defaults = self._read("link_defaults", LinkDefaults)
         self.links = self._read_links()
         self.pmu = self._read("pmu", PmuEntry) or PmuEntry.model_validate({})

@@ -84,9 +84,7 @@ PACKET_COLUMNS = (
     Column("sequence", "", "number of the frame", "int64"),
     Column("measured_ns", "ns", "instant of measurement", "int64"),
     Column("ended_ns", "ns", "when the controller could use it, or when it was dropped", "int64"),
-    Column(
-        "outcome", "", "0 delivered, 1 dropped at queue, 2 lost on link, 3 link down", "uint8"
-    ),
+    Column("outcome", "", "0 delivered, 1 dropped at queue, 2 lost on link, 3 link down", "uint8"),
 )
 
 

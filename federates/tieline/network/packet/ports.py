@@ -49,6 +49,7 @@ from tieline.network.packet.memory import (
     NONE,
     OVERHEAD,
     PACKETS,
+    PART,
     PEER,
     PER_BIT,
     PROPAGATION,
@@ -67,6 +68,7 @@ from tieline.network.packet.memory import (
     TAP_BYTES,
     TAP_FLOW,
     TAP_HOP,
+    TAP_PART,
     TAP_PORT,
     TAP_SEQUENCE,
     TAP_TIME,
@@ -265,6 +267,7 @@ def _reach(
         cells[record + TAP_FLOW] = cells[packet + FLOW]
         cells[record + TAP_SEQUENCE] = cells[packet + SEQUENCE]
         cells[record + TAP_HOP] = hop
+        cells[record + TAP_PART] = cells[packet + PART]
         cells[record + TAP_BYTES] = size - cells[port + OVERHEAD]
         cells[at.control + TAPPED] += 1
     return arrival_ns
