@@ -18,8 +18,7 @@ ENTRY_LINE = 4
 def two_nodes(link: str = "", flow: str = "") -> str:
     """Return a file with further words of its one link, or with one cross flow."""
     head = (
-        "link_defaults: {rate: 10 Mbit/s, queue: 50}\n"
-        "nodes: {a: {buses: [1]}, b: {buses: [2]}}\n"
+        "link_defaults: {rate: 10 Mbit/s, queue: 50}\nnodes: {a: {buses: [1]}, b: {buses: [2]}}\n"
     )
     the_link = f"{{a: a, b: b, propagation: 1 ms{link and ', '}{link}}}"
     if flow:

@@ -27,7 +27,9 @@ def exponential_sizes(seed: int, mean_bytes: float, count: int) -> Numbers:
     return np.maximum(HEADER_BYTES + 1, sizes).astype(np.int64)
 
 
-def recorded(times_ns: Numbers, ip_bytes: Numbers | int, dscp: int = 0, name: str = "0") -> CrossFlow:
+def recorded(
+    times_ns: Numbers, ip_bytes: Numbers | int, dscp: int = 0, name: str = "0"
+) -> CrossFlow:
     """Return a flow from a to b of packets of given sizes."""
     sizes = np.broadcast_to(np.asarray(ip_bytes, dtype=np.int64), times_ns.shape)
     return CrossFlow(name, Trace(times_ns, sizes - HEADER_BYTES), ("a", "b"), dscp=dscp)

@@ -76,4 +76,6 @@ def test_overhead_and_framing_at_once_are_refused(tmp_path):
     found = refused(tmp_path, two_nodes("overhead: 5, framing: ppp"))
     assert found.startswith("links.0 'overhead' and 'framing' say the same thing")
     found = refused(tmp_path, two_nodes("framing: pp"))
-    assert found.startswith("links.0.framing must be 'ethernet', 'ppp', 'ppp_hdlc', 't1' or 'sonet'")
+    assert found.startswith(
+        "links.0.framing must be 'ethernet', 'ppp', 'ppp_hdlc', 't1' or 'sonet'"
+    )

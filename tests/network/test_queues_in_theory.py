@@ -168,13 +168,18 @@ def test_waits_with_priority_are_cobhams(loads):
     R / ((1 - rho_1) (1 - rho_1 - rho_2)). Urgent ones are 250 bytes, 0.5 ms; the others 500, 1 ms.
     """
     services = (SERVICE_NS / 2, SERVICE_NS)
-    counts = [int(100_000 * load / service * SERVICE_NS) for load, service in zip(loads, services)]
+    counts = [
+        int(100_000 * load / service * SERVICE_NS)
+        for load, service in zip(loads, services, strict=True)
+    ]
     flows = [
-        recorded(poisson_times(31 + i, services[i] / loads[i], counts[i] // 40 * 40), size, dscp, f"{i}")
+        recorded(
+            poisson_times(31 + i, services[i] / loads[i], counts[i] // 40 * 40), size, dscp, f"{i}"
+        )
         for i, (size, dscp) in enumerate(((250, URGENT), (500, 0)))
     ]
     urgent, other = waits_ns(one_link(4_000_000, two_classes(StrictPriority), *flows))
-    residual = sum(load * service / 2 for load, service in zip(loads, services))
+    residual = sum(load * service / 2 for load, service in zip(loads, services, strict=True))
     assert_mean(urgent, residual / (1 - loads[0]), 0.03)
     assert_mean(other, residual / ((1 - loads[0]) * (1 - sum(loads))), 0.06)
 
@@ -212,7 +217,7 @@ def test_shares_are_in_the_ratio_of_quanta(quanta):
     counts = (60_000, 20_000)
     flows = [
         recorded(np.zeros(count, dtype=np.int64), size, dscp, f"{i}")
-        for i, (size, count, dscp) in enumerate(zip(sizes, counts, (URGENT, 0)))
+        for i, (size, count, dscp) in enumerate(zip(sizes, counts, (URGENT, 0), strict=True))
     ]
     engine = PacketEngine(
         one_link(8_000_000, two_classes(DeficitRoundRobin, WIDE, quanta), *flows), seed=1
@@ -320,7 +325,9 @@ def test_half_duplex_waits_are_those_of_one_queue():
     Poisson traffic from both ends: the order of service changes no mean wait where all packets are
     alike, so it is that of M/D/1 at the whole load.
     """
-    flows = [recorded(poisson_times(41 + i, SERVICE_NS / 0.3, 60_000), 500, name=f"{i}") for i in (0, 1)]
+    flows = [
+        recorded(poisson_times(41 + i, SERVICE_NS / 0.3, 60_000), 500, name=f"{i}") for i in (0, 1)
+    ]
     flows[1] = CrossFlow("1", flows[1].traffic, ("b", "a"))
     spec = one_link(4_000_000, DropTail(WIDE), *flows, is_half_duplex=True)
     waits = waits_ns(spec)
