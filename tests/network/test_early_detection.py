@@ -148,3 +148,20 @@ def test_early_drops_are_the_same_in_every_run_and_others_with_another_seed():
     )
     assert first == again
     assert first != other
+
+
+def test_an_average_of_thousands_decays_in_an_idle_time():
+    """Otherwise the average of a long queue would overflow, and the next packets pass it by.
+
+    A burst lifts the average above 10,000 packets; 20 ms after the last of it has left, about 1.6
+    times the service of a packet of 12,029 bytes, the next come while the average is still high.
+    """
+    queue, first = red(20_000, 8_500, 20_000, 1.0, 9), 12_000
+    sizes = 29 + np.arange(first + 1_000)
+    times_ns = np.arange(first + 1_000)
+    through = accepted_by_the_paper(queue, times_ns[:first], sizes[:first])
+    idle_from_ns = int(sizes[through].sum()) * BYTE_NS
+    times_ns[first:] = idle_from_ns + 20_000_000 + 13_000_000 * np.arange(1_000)
+    expected = accepted_by_the_paper(queue, times_ns, sizes)
+    assert accepted_by_the_engine(queue, times_ns, sizes) == expected
+    assert sum(place >= first for place in expected) < 1_000
