@@ -235,9 +235,11 @@ def _transmit_special(now: int, slot: int, hop: int, cells: Cells, at: Layout) -
     service_ns = cells[plan + HOP_SERVICE]
     if service_ns == NONE:
         service_ns = _service_ns(size, port, cells)
-    if is_full or (
-        special & HAS_RED != 0 and is_dropped_early(now, waiting, service_ns, port, cells, at)
-    ):
+    # Every packet that comes counts in the average of early detection, also at a full queue.
+    is_early = special & HAS_RED != 0 and is_dropped_early(
+        now, waiting, service_ns, port, cells, at
+    )
+    if is_full or is_early:
         cells[port + QUEUE_DROPS] += 1
         return DROPPED_AT_QUEUE
     if start_ns > now:
