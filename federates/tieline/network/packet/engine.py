@@ -201,17 +201,19 @@ class PacketEngine:
     def _change(self) -> None:
         """Do the next change of the network."""
         at_ns = self._changes.next_ns
-        while (
-            len(self._memory.inside()) * self._memory.layout.most_packets
-            > self._memory.layout.capacity
-        ):
+        while self._inside() > self._memory.layout.capacity:
             self._memory.grow()
-        down = list(self._changes.apply(self._memory))
+        starts = self._changes.apply(self._memory)
         self._collect()
-        # What waited at a link that went down has not gone on it.
-        for place, rows in enumerate(self._tapped):
-            never = (rows[:, TAP_TIME] >= at_ns) & np.isin(rows[:, TAP_PORT], down)
-            self._tapped[place] = rows[~never]
+        tapped = np.concatenate([*self._tapped, np.empty((0, 6), np.int64)])
+        for port, starts_ns in starts.items():
+            waits = (tapped[:, TAP_PORT] == port) & (tapped[:, TAP_TIME] >= at_ns)
+            if len(starts_ns) and waits.any():
+                tapped[waits, TAP_TIME] = starts_ns
+            elif len(starts_ns) == 0:
+                # What waited at a link that went down has not gone on it.
+                tapped = tapped[~waits]
+        self._tapped = [tapped]
 
     def _announce(
         self, times_ns: NDArray[np.int64], items: NDArray[np.int64], base_order: int
