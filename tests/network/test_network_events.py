@@ -353,3 +353,25 @@ def test_many_packets_in_flight_survive_a_cut_elsewhere(transport):
     engine.run_until(SECOND // 2 - 1)
     assert engine.counts().in_flight > 3000
     assert len(engine.run_until(3 * SECOND).arrivals) == 1
+
+
+@pytest.mark.parametrize("step_ns", [SECOND // 1000, SECOND // 7])
+def test_packets_die_at_a_cut_in_one_order_however_the_tables_grew(step_ns):
+    """Otherwise the order of drops would depend on how often a federation meets.
+
+    More frames are on the link than the tables hold at first.
+    """
+    links = [Link("a", "b", 10**10, SECOND, DropTail(9000))]
+    places = [Destination("c", "G", 1, "b"), Destination("d", "H", 2, "b")]
+    spec = joined(links, [Source("p", 1, "a")], places)
+    spec = replace(spec, changes=(LinkCut(SECOND * 9 // 10, 0),))
+    runs = []
+    for step in (step_ns, SECOND):
+        engine = PacketEngine(spec, seed=1)
+        for k in range(4_000):
+            engine.send(SECOND // 4 + 100_000 * k, ONE, k)
+        instants = *range(0, 2 * SECOND, step), 2 * SECOND
+        outcomes = [engine.run_until(until_ns) for until_ns in instants]
+        runs.append(np.concatenate([outcome.drops for outcome in outcomes]))
+    assert runs[0].tobytes() == runs[1].tobytes()
+    assert runs[0]["destination"].tolist() == [0] * 4_000 + [1] * 4_000
