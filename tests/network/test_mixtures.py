@@ -9,6 +9,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import tieline
 from network.mixtures import all_that_happens, mixed_network, mixture_digest
 from tieline.network.packet import PacketEngine
 
@@ -64,9 +65,8 @@ def test_the_compiler_changes_nothing_whatever_happens():
     seeds = list(range(12))
     script = f"from network.mixtures import mixture_digest; print(mixture_digest({seeds}))"
     tests = Path(__file__).parents[1]
-    environment = os.environ | {"TIELINE_COMPILER": "off", "PYTHONPATH": str(tests)}
-    source = Path(sys.modules["tieline"].__file__ or "").parents[1]
-    environment["PYTHONPATH"] = f"{tests}{os.pathsep}{source}"
+    path = os.pathsep.join([str(tests), str(Path(tieline.__file__).parents[1])])
+    environment = os.environ | {"TIELINE_COMPILER": "off", "PYTHONPATH": path}
     plain = subprocess.run(
         [sys.executable, "-W", "error", "-c", script],
         env=environment,

@@ -355,23 +355,26 @@ def test_many_packets_in_flight_survive_a_cut_elsewhere(transport):
     assert len(engine.run_until(3 * SECOND).arrivals) == 1
 
 
-@pytest.mark.parametrize("step_ns", [SECOND // 1000, SECOND // 7])
-def test_packets_die_at_a_cut_in_one_order_however_the_tables_grew(step_ns):
-    """Otherwise the order of drops would depend on how often a federation meets.
+def test_packets_die_at_a_cut_in_one_order_however_the_tables_grew():
+    """Otherwise the order of drops would depend on how far ahead frames are announced.
 
-    More frames are on the link than the tables hold at first.
+    More frames are on the link than the tables hold at first; they grow sooner if all are announced
+    at the beginning.
     """
-    links = [Link("a", "b", 10**10, SECOND, DropTail(9000))]
+    links = [Link("a", "b", 10**10, SECOND, DropTail(9))]
     places = [Destination("c", "G", 1, "b"), Destination("d", "H", 2, "b")]
     spec = joined(links, [Source("p", 1, "a")], places)
     spec = replace(spec, changes=(LinkCut(SECOND * 9 // 10, 0),))
     runs = []
-    for step in (step_ns, SECOND):
+    for is_early in (True, False):
         engine = PacketEngine(spec, seed=1)
+        outcomes = []
         for k in range(4_000):
-            engine.send(SECOND // 4 + 100_000 * k, ONE, k)
-        instants = *range(0, 2 * SECOND, step), 2 * SECOND
-        outcomes = [engine.run_until(until_ns) for until_ns in instants]
+            measured_ns = SECOND // 4 + 100_000 * k
+            if not is_early:
+                outcomes.append(engine.run_until(measured_ns - 1))
+            engine.send(measured_ns, ONE, k)
+        outcomes.append(engine.run_until(2 * SECOND))
         runs.append(np.concatenate([outcome.drops for outcome in outcomes]))
     assert runs[0].tobytes() == runs[1].tobytes()
-    assert runs[0]["destination"].tolist() == [0] * 4_000 + [1] * 4_000
+    assert len(runs[0]) == 8_000
