@@ -5,6 +5,7 @@ from typing import Any, TypeVar
 
 import networkx as nx
 
+from tieline.errors import InputError
 from tieline.network.entry import Entry
 from tieline.network.findings import Findings
 from tieline.network.jitter import Jitter, JitterEntry
@@ -100,8 +101,9 @@ class Entries:
 
     def refuse(self) -> None:
         """Raise InputError with everything that is wrong, if anything is."""
-        self._findings.refuse()
-        self._added.refuse()
+        found = [*self._findings.lines(), *self._added.lines()]
+        if found:
+            raise InputError(found)
 
     def _read(self, section: str, model: type[AnEntry]) -> AnEntry | None:
         return self._findings.entry(self._data.get(section, {}), (section,), model)

@@ -203,15 +203,11 @@ class PacketEngine:
     def _change(self) -> None:
         """Do the next change of the network."""
         at_ns = self._changes.next_ns
-        while (
-            len(self._memory.inside()) * self._memory.layout.most_packets
-            > self._memory.layout.capacity
-        ):
+        while self._inside() > self._memory.layout.capacity:
             self._memory.grow()
-        down = list(self._changes.apply(self._memory))
+        starts = self._changes.apply(self._memory)
         self._collect()
-        # What waited at a link that went down has not gone on it.
-        self._taps.withdraw(down, at_ns)
+        self._taps.move(starts, at_ns)
 
     def _announce(
         self, times_ns: NDArray[np.int64], items: NDArray[np.int64], base_order: int

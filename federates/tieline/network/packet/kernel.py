@@ -209,7 +209,7 @@ def _send_cross(now: int, number: int, cells: Cells, at: Layout) -> None:
     row = at.cross + _CROSS * number
     flow = at.pmu_flows + number
     if cells[at.flows + _FLOW * flow + CONNECTION] != NONE:
-        tcp.begin(now, cells[at.flows + _FLOW * flow + CONNECTION], cells, at)
+        tcp.begin_or_end(now, cells[at.flows + _FLOW * flow + CONNECTION], cells, at)
     elif cells[row + SIZE_STREAM] == NONE:
         enter(now, flow, cells[row + SENT], cells, at)
     else:

@@ -57,10 +57,12 @@ class Routes:
         carried: of each flow but trees, the PMU or cross flow that it serves, and whether it goes
             back to that flow's source.
         most_pieces: the most packets that a datagram is sent in.
-        reroutes: for each `Reroute` of the spec, in order, (flow, first hop) of what it changes.
+        reroutes: for each `Reroute` of the spec, in order, (flow, first hop, most of a datagram in
+            a packet or `NONE`) of what it changes.
 
     Raises:
-        InputError: a link's MTU is too small, or a segment of a connection exceeds it.
+        InputError: a link's MTU is too small, or a segment of a connection or a request that is
+            answered exceeds it.
     """
 
     def __init__(self, spec: NetworkSpec) -> None:
@@ -82,6 +84,7 @@ class Routes:
         self.carried: list[tuple[int, bool]] = []
         self._loads: list[Load] = []
         self._frames = Load(FRAME_BYTES + UDP_HEADER, spec.dscp)
+        self._ways = {number: flow.route for number, flow in enumerate(spec.flows)}
         self._add_pmu_flows()
         self._add_cross_flows()
         if spec.transport == "tcp":
@@ -108,6 +111,7 @@ class Routes:
             if is_connection:
                 backs.append((number, cross.way_back, Load(TCP_HEADER, cross.dscp)))
             elif isinstance(traffic, Answered):
+                self._check_whole(number, self.flows[number][4], "request")
                 answer = Load(traffic.reply_bytes + UDP_HEADER, cross.dscp)
                 backs.append((number, cross.way_back, answer))
         for number, route, load in backs:
@@ -135,12 +139,16 @@ class Routes:
                 first_hop, destination, _, datagram, piece = self.flows[flow]
                 self.flows[flow] = (first_hop, destination, connection, datagram, piece)
         for flow in (data, ack):
-            if self.flows[flow][4] != NONE:
-                raise InputError(
-                    f"a segment of {self.flows[flow][3] + IP_HEADER} bytes exceeds the MTU of a "
-                    "link on its route: lower its payload"
-                )
+            self._check_whole(flow, self.flows[flow][4], "segment")
         self.connections.append(Connection(data, ack, frames_of, window))
+
+    def _check_whole(self, flow: int, piece: int, kind: str) -> None:
+        """Raise InputError if a flow's packets go in pieces: nothing puts them together again."""
+        if piece != NONE:
+            raise InputError(
+                f"a {kind} of {self._loads[flow].datagram + IP_HEADER} bytes exceeds the MTU of a "
+                "link on its route: lower its payload"
+            )
 
     def _add_flow(
         self, route: Route, load: Load, carried: tuple[int, bool], destination: int = NONE
@@ -229,25 +237,29 @@ class Routes:
                 pending.append((branch_low, branch_high, depth, first + len(ends) + place))
         return root
 
-    def _rerouted(self, change: Reroute) -> list[tuple[int, int]]:
-        """Add the hops of other routes; return each flow that takes one, and its first hop."""
+    def _rerouted(self, change: Reroute) -> list[tuple[int, int, int]]:
+        """Add the hops of other routes; return each flow that takes one, as `reroutes` has it."""
         moved: dict[int, Route] = dict(change.routes)
-        moved |= {self.back_of[flow]: way for flow, way in change.ways_back.items()}
+        ways_back = change.ways_back.items()
+        moved |= {self.back_of[flow]: way for flow, way in ways_back if flow in self.back_of}
         for connection in self.connections:
-            if connection.frames_of in moved:
-                route = moved[connection.frames_of]
+            if connection.frames_of in change.routes:
+                route = change.routes[connection.frames_of]
                 moved |= {connection.data_flow: route, connection.ack_flow: route[::-1]}
-        hops = [(flow, self._path(route, self._loads[flow])[0]) for flow, route in moved.items()]
+        hops = [(flow, *self._path(route, self._loads[flow])) for flow, route in moved.items()]
+        segments = {flow for pair in self.connections for flow in pair[:2]}
+        for flow, _, piece in hops:
+            if flow in segments or flow in self.back_of:
+                self._check_whole(flow, piece, "segment" if flow in segments else "request")
         return hops + self._trees_moved(change.routes)
 
-    def _trees_moved(self, routes: Mapping[int, Route]) -> list[tuple[int, int]]:
+    def _trees_moved(self, routes: Mapping[int, Route]) -> list[tuple[int, int, int]]:
         hops = []
+        self._ways |= {flow: way for flow, way in routes.items() if flow in self._ways}
         for first, end, tree in self.sources:
             own = range(first, end)
             if tree != NONE and any(flow in routes for flow in own):
-                flows = self._spec.flows
-                ways = [(routes.get(flow, flows[flow].route), flow) for flow in own]
-                hops.append((tree, self._tree(ways)))
+                hops.append((tree, self._tree([(self._ways[flow], flow) for flow in own]), NONE))
         return hops
 
 

@@ -1,6 +1,6 @@
 """What links that are listened to have carried, from the kernel's records to those for captures."""
 
-from collections.abc import Collection
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,11 +53,21 @@ class Taps:
             self._new.append(self._memory.table("taps")[:count].copy())
             self._memory.control[TAPPED] = 0
 
-    def withdraw(self, ports: Collection[int], at_ns: int) -> None:
-        """Forget packets that were to go on some ports at an instant or later: these are down."""
+    def move(self, starts_ns: Mapping[int, NDArray[np.int64]], at_ns: int) -> None:
+        """Give packets that wait at some ports at an instant the starts that they have now.
+
+        Args:
+            starts_ns: by port; where it is empty the port went down, and nothing more starts.
+            at_ns: the instant.
+        """
         rows = self._all()
-        never = (rows[:, TAP_TIME] >= at_ns) & np.isin(rows[:, TAP_PORT], list(ports))
-        self._rows = rows[~never]
+        for port, own_ns in starts_ns.items():
+            waits = (rows[:, TAP_PORT] == port) & (rows[:, TAP_TIME] >= at_ns)
+            if len(own_ns) == 0:
+                rows = rows[~waits]
+            elif waits.any():
+                rows[waits, TAP_TIME] = own_ns
+        self._rows = rows
 
     def due(self, now_ns: int) -> NDArray[np.void]:
         """Return (n,) of `TAP`, in order of time: what has gone on a link by an instant."""
