@@ -63,7 +63,7 @@ ENTRIES = {
         ),
     ],
     "greedy": [
-        ("start: 0", Greedy(1448, 90)),
+        ("start: 0", Greedy(1460, 90)),
         ("payload: 500, window: 7", Greedy(500, 7)),
     ],
     "flood": [("rate: 2 Mbit/s, start: 3 s", Poisson(2e6, 18))],

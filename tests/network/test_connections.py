@@ -1,6 +1,6 @@
 """Connections in the manner of TCP: order, retransmission, windows, and what they get of a link.
 
-A segment of a PMU frame is 34 + 32 + 20 bytes: 688 us at 1 Mbit/s; an acknowledgement is 52: 416.
+A segment of a PMU frame is 34 + 20 + 20 bytes: 592 us at 1 Mbit/s; an acknowledgement is 40: 320.
 """
 
 import math
@@ -22,7 +22,7 @@ from tieline.network.traffic import Greedy
 
 ONE = np.array([0])
 SECOND = 10**9
-SEGMENT_NS, ACK_NS, WAY_NS = 688_000, 416_000, 10_000_000
+SEGMENT_NS, ACK_NS, WAY_NS = 592_000, 320_000, 10_000_000
 
 
 def connected(loss: Loss | None = None) -> NetworkSpec:
@@ -52,7 +52,7 @@ def test_without_losses_a_frame_takes_serialisation_and_propagation():
     assert set((arrivals["arrival_ns"] - np.arange(20) * 20_000_000).tolist()) == {
         SEGMENT_NS + WAY_NS
     }
-    assert (engine.links()[0].bytes, engine.links()[1].bytes) == (20 * 86, 20 * 52)
+    assert (engine.links()[0].bytes, engine.links()[1].bytes) == (20 * 74, 20 * 40)
 
 
 def test_frames_behind_a_lost_one_come_with_its_retransmission():
@@ -60,9 +60,9 @@ def test_frames_behind_a_lost_one_come_with_its_retransmission():
 
     Frames every 20 ms; the second segment is lost, and so is the second acknowledgement, the first
     one that repeats. The third, fourth and fifth later segments make three duplicates; the last of
-    them leaves at 100 + 10.688 ms. It is back 10.416 ms later, and the lost segment takes 10.688 ms
+    them leaves at 100 + 10.592 ms. It is back 10.320 ms later, and the lost segment takes 10.592 ms
     again. By then all that was sent up to 120 ms is there. The window is then 3 + 3 segments, as
-    many as are under way, so the eighth frame leaves with the next duplicate, at 141.104 ms.
+    many as are under way, so the eighth frame leaves with the next duplicate, at 140.912 ms.
     """
     engine = PacketEngine(connected(LossTrace((1,))), seed=1)
     for k in range(9):
@@ -70,7 +70,7 @@ def test_frames_behind_a_lost_one_come_with_its_retransmission():
     outcome = engine.run_until(ALL)
     again_ns = 100_000_000 + 2 * (SEGMENT_NS + WAY_NS) + ACK_NS + WAY_NS
     expected = [SEGMENT_NS + WAY_NS] + [again_ns] * 6
-    expected += [sent_ns + SEGMENT_NS + WAY_NS for sent_ns in (141_104_000, 160_000_000)]
+    expected += [sent_ns + SEGMENT_NS + WAY_NS for sent_ns in (140_912_000, 160_000_000)]
     assert outcome.arrivals["sequence"].tolist() == list(range(9))
     assert outcome.arrivals["arrival_ns"].tolist() == expected
     assert len(outcome.drops) == 0

@@ -111,7 +111,7 @@ def test_a_large_reply_goes_in_pieces():
     ("traffic", "mtu", "said"),
     [
         (Polling(SECOND, 2000, 250, 0), 1500, "a request of 2028 bytes exceeds the MTU"),
-        (Greedy(1460, 10), 1500, "a segment of 1512 bytes exceeds the MTU"),
+        (Greedy(1461, 10), 1500, "a segment of 1501 bytes exceeds the MTU"),
         (Datagrams(100), 60, "must be at least 68 bytes"),
     ],
 )
@@ -147,5 +147,5 @@ def test_another_route_has_its_own_pieces(before, after, pieces):
 
 def test_a_route_for_which_segments_are_too_large_is_refused():
     """Otherwise a connection would send what its new way does not carry."""
-    with pytest.raises(InputError, match="a segment of 1052 bytes exceeds the MTU"):
+    with pytest.raises(InputError, match="a segment of 1040 bytes exceeds the MTU"):
         PacketEngine(ring(Greedy(1000, 10), 1500, 600), seed=1)

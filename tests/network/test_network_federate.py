@@ -41,6 +41,7 @@ def run_file(folder: Path, intervals: int = 90, **network: Any) -> dict[str, Any
     settings = {"engine": "packet", "topology": str(path)} | network
     return {
         "seed": 3,
+        "frequency_hz": 60.0,
         "clock": {"rate_hz": 60, "intervals": intervals},
         "network": settings,
         "sources": SOURCES,

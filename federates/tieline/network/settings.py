@@ -129,7 +129,7 @@ class NetworkSettings(BaseModel):
         None,
         ge=0,
         le=1e4,
-        description="time until routes follow a failure or repair, in place of the topology's own, s",
+        description="time until routes follow a failure, in place of the topology's own, s",
     )
     capture: tuple[tuple[str, str], ...] = Field(
         (), description="links (pairs of nodes) whose packets are written to capture files"

@@ -43,7 +43,7 @@ class GreedyEntry(FlowEntry):
     """A greedy connection."""
 
     kind: Literal["greedy"]
-    payload: Payload = Field(1448, description="payload of a segment, bytes")
+    payload: Payload = Field(1460, description="payload of a segment, bytes")
     window: int = Field(
         90, ge=1, le=MOST_WINDOW, strict=True, description="most segments under way"
     )
