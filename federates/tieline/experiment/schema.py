@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictInt
 
 from tieline.cosim.interfaces import FederationSettings
 from tieline.grid.settings import GridSettings
-from tieline.network.settings import NetworkSettings
+from tieline.network.settings import PACKET_ENGINES, NetworkSettings
 from tieline.problems import Path, Problem
 from tieline.wams.settings import WamsSettings
 
@@ -58,8 +58,8 @@ def without_effect(experiment: Experiment) -> list[Problem]:
     network = experiment.network
     readers = {
         "delay": ("constant",),
-        "mean_delay": ("packet",),
-        "loss": ("packet",),
+        "mean_delay": PACKET_ENGINES,
+        "loss": PACKET_ENGINES,
     }
     return [
         Problem(
@@ -118,11 +118,12 @@ def _average(experiment: Experiment) -> Iterator[Problem]:
 
 def _engine(experiment: Experiment) -> Iterator[Problem]:
     network = experiment.network
-    if experiment.wams.reporting == "continuous" and network.engine == "packet":
+    if experiment.wams.reporting == "continuous" and network.engine in PACKET_ENGINES:
         yield Problem(
             (("wams", "reporting"), ("network", "engine")),
             "wams.reporting 'continuous' sends no frames, so it needs network.engine ideal or"
-            " constant (got packet); give frames a second, such as 60, for packet",
+            f" constant (got {network.engine}); give frames a second, such as 60, for"
+            f" {network.engine}",
         )
     if network.engine == "constant" and network.delay is None:
         yield Problem(

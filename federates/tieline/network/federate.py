@@ -10,9 +10,10 @@ from tieline.cosim.interfaces import DELIVERY, NETWORK, Clock, DeliveryBundle, F
 from tieline.errors import CosimError, TimeContractBroken
 from tieline.network.engine import Engine, Outcome
 from tieline.network.ideal import ConstantDelay
+from tieline.network.ns3 import Ns3Engine
 from tieline.network.packet import PacketEngine
 from tieline.network.results import PacketLog, write_delays, write_flows, write_links
-from tieline.network.settings import NetworkSettings
+from tieline.network.settings import PACKET_ENGINES, NetworkSettings
 from tieline.network.spec import FRAME_BYTES, NetworkSpec, least_delay_ns
 from tieline.network.stats import FlowStatistics
 from tieline.network.topology import network_spec
@@ -23,19 +24,23 @@ def open_participant(run: dict[str, Any], folder: Path) -> "NetworkParticipant":
     """Return the network of a run file's content, whose results go to `folder`.
 
     Raises:
-        InputError: the topology is faulty, or a setting that the engine needs is missing.
+        InputError: the topology is faulty, a setting that the engine needs is missing, or ns-3 is
+            not installed or cannot carry the network.
     """
     stated = run["network"]
     settings = NetworkSettings.model_validate({**stated, "topology": stated["topology"] or "case"})
-    is_packet = settings.engine == "packet"
-    topology = Path(settings.topology) if is_packet else None
+    topology = Path(settings.topology) if settings.engine in PACKET_ENGINES else None
     spec = network_spec(settings, topology, run["sources"], run["destinations"])
-    engine: Engine
-    if is_packet:
-        engine = PacketEngine(spec, run["seed"])
-    else:
-        engine = ConstantDelay(len(spec.destinations), spec.lookahead_ns)
+    engine = _engine(settings, spec, run["seed"])
     return NetworkParticipant(Clock(**run["clock"]), spec, engine, folder, settings.record_packets)
+
+
+def _engine(settings: NetworkSettings, spec: NetworkSpec, seed: int) -> Engine:
+    if settings.engine == "packet":
+        return PacketEngine(spec, seed)
+    if settings.engine == "ns3":
+        return Ns3Engine(spec, seed)
+    return ConstantDelay(len(spec.destinations), spec.lookahead_ns)
 
 
 class NetworkParticipant:
@@ -82,14 +87,15 @@ class NetworkParticipant:
         self._check(k, bundle)
         sources = np.arange(len(bundle.payloads))
         if len(sources):
-            self._engine.send(bundle.measured_ns, sources, k)
+            self._engine.send(bundle.measured_ns, sources, k, bundle.payloads)
             self._statistics.add_sent(sources)
             self._frames.keep(k, bundle.payloads)
         return self._carry(k + self._clock.lead)
 
     def finish(self) -> None:
-        """Write the tables."""
+        """Write the tables and close the engine."""
         self._write()
+        self._engine.close()
 
     def abort(self, reason: str) -> None:
         """Write the tables as far as the run came."""

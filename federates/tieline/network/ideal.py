@@ -34,8 +34,14 @@ class ConstantDelay:
         self._sent = 0
         self._delivered = 0
 
-    def send(self, measured_ns: int, sources: NDArray[np.int64], sequence: int) -> None:
-        """Take the frames of one instant.
+    def send(
+        self,
+        measured_ns: int,
+        sources: NDArray[np.int64],
+        sequence: int,
+        payloads: NDArray[np.uint8] | None = None,
+    ) -> None:
+        """Take the frames of one instant; it carries no bytes.
 
         Raises:
             CosimError: the last `run_until` has passed the instant at which they arrive.
@@ -73,3 +79,6 @@ class ConstantDelay:
     def links(self) -> list[LinkUse]:
         """Return nothing: there are no links."""
         return []
+
+    def close(self) -> None:
+        """Do nothing: it holds nothing outside Python."""

@@ -6,15 +6,21 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictFloat
 
 from tieline.units import Seconds
 
+PACKET_ENGINES = ("packet", "ns3")
+"""The engines that simulate every packet of a topology."""
+
 
 class NetworkSettings(BaseModel):
     """The engine that carries the frames, and what the experiment changes of its topology."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    engine: Literal["ideal", "constant", "packet"] = Field(
+    engine: Literal["ideal", "constant", "packet", "ns3"] = Field(
         "packet",
-        description="ideal: no delay; constant: one delay for all; packet: a simulated network",
+        description=(
+            "ideal: no delay; constant: one delay for all; packet: a simulated network; "
+            "ns3: the same network in the ns-3 simulator, which is an extra of its own"
+        ),
     )
     delay: Seconds | None = Field(
         None, ge=0, le=10, description="combined delay of the constant engine, s"
@@ -27,7 +33,7 @@ class NetworkSettings(BaseModel):
         gt=0,
         le=10,
         description=(
-            "mean combined delay that the packet engine's processing times are lengthened to, s; "
+            "mean combined delay that the PMUs' processing times are lengthened to, s; "
             "none leaves the topology as it is"
         ),
     )

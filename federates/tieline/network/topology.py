@@ -5,6 +5,7 @@ from pathlib import Path
 
 from tieline.errors import InputError
 from tieline.network.entries import Entries, Sites
+from tieline.network.ns3.limits import check_carried
 from tieline.network.routing import routes_from
 from tieline.network.settings import NetworkSettings
 from tieline.network.spec import (
@@ -51,15 +52,19 @@ def network_spec(
 
     Args:
         settings: engine, and what it needs.
-        topology: the file of the packet engine's network; None for the other engines.
+        topology: the file of the network of an engine that simulates packets; None for the others.
         sources: the PMUs, as for `read_topology`.
         destinations: the controllers, as for `read_topology`.
 
     Raises:
-        InputError: as `read_topology`, or the constant engine has no delay.
+        InputError: as `read_topology`, the constant engine has no delay, or ns-3 is not installed
+            or cannot carry the network.
     """
     if topology is not None:
-        return read_topology(topology, sources, destinations, settings)
+        spec = read_topology(topology, sources, destinations, settings)
+        if settings.engine == "ns3":
+            check_carried(spec)
+        return spec
     if settings.engine == "constant" and settings.delay is None:
         raise InputError("network.delay must be given with network.engine constant")
     delay_s = settings.delay if settings.engine == "constant" else None

@@ -5,30 +5,22 @@ from numpy.typing import NDArray
 
 from tieline.errors import CosimError
 from tieline.network.engine import (
-    ARRIVAL,
     DELIVERED,
-    DROP,
     LOSS,
-    NO_ARRIVALS,
     QUEUE_FULL,
     Counts,
     LinkUse,
     Outcome,
     check_not_late,
-    in_order,
 )
 from tieline.network.packet import kernel
 from tieline.network.packet.build import Supplies, Traces, laid_out
-from tieline.network.packet.draws import jitters
+from tieline.network.packet.endings import Endings
 from tieline.network.packet.memory import (
     ARRIVED,
     BUSY,
     BYTES,
     DRAWS_CHUNK,
-    END_FLOW,
-    END_HOW,
-    END_SEQUENCE,
-    END_TIME,
     ENDED,
     FIRST_DRAW,
     FREE_AT,
@@ -44,7 +36,8 @@ from tieline.network.packet.memory import (
     USED,
     WANTS_DRAWS,
 )
-from tieline.network.spec import NetworkSpec, Source
+from tieline.network.packet.pmu import Pmu
+from tieline.network.spec import NetworkSpec
 
 
 class PacketEngine:
@@ -69,21 +62,26 @@ class PacketEngine:
         self._spec = spec
         self._supplies = Supplies(seed)
         self._memory = laid_out(spec, self._supplies, traces or {})
-        self._pmus = [_Pmu(source, seed) for source in spec.sources]
-        self._flow_ends = np.array(
-            [(flow.source, flow.destination) for flow in spec.flows], dtype=np.int64
-        ).reshape(-1, 2)
-        self._flows_of = np.bincount(self._flow_ends[:, 0], minlength=len(spec.sources))
+        self._pmus = [Pmu(source, seed) for source in spec.sources]
+        self._endings = Endings(spec.flows)
+        self._flows_of = np.bincount(
+            np.array([flow.source for flow in spec.flows], dtype=np.int64),
+            minlength=len(spec.sources),
+        )
         self.lookahead_ns = spec.lookahead_ns
         self._now_ns = -1
-        self._held = NO_ARRIVALS
         self._rows: list[NDArray[np.int64]] = []
         self._sent = 0
-        self._ended = np.zeros(3, dtype=np.int64)
         self._start_cross_flows()
 
-    def send(self, measured_ns: int, sources: NDArray[np.int64], sequence: int) -> None:
-        """Take the frames that some sources measured at one instant.
+    def send(
+        self,
+        measured_ns: int,
+        sources: NDArray[np.int64],
+        sequence: int,
+        payloads: NDArray[np.uint8] | None = None,
+    ) -> None:
+        """Take the frames that some sources measured at one instant; it carries no bytes.
 
         Raises:
             CosimError: the last `run_until` has passed the instant at which a frame may enter.
@@ -108,7 +106,8 @@ class PacketEngine:
                 self._refill()
             elif not kernel.has_room(self._memory.cells, self._memory.layout):
                 self._memory.grow()
-        outcome = self._outcome(until_ns)
+        outcome = self._endings.outcome(np.concatenate(self._rows), until_ns)
+        self._rows.clear()
         self.counts().check(until_ns)
         return outcome
 
@@ -118,10 +117,10 @@ class PacketEngine:
         inside = self._memory.layout.capacity - int(self._memory.control[FREE_PACKETS])
         return Counts(
             sent=self._sent + int(cross[SENT]),
-            delivered=int(self._ended[DELIVERED] + cross[ARRIVED + DELIVERED]),
-            dropped_queue=int(self._ended[QUEUE_FULL] + cross[ARRIVED + QUEUE_FULL]),
-            dropped_loss=int(self._ended[LOSS] + cross[ARRIVED + LOSS]),
-            in_flight=inside + len(self._held) + self._packets_announced(),
+            delivered=int(self._endings.counts[DELIVERED] + cross[ARRIVED + DELIVERED]),
+            dropped_queue=int(self._endings.counts[QUEUE_FULL] + cross[ARRIVED + QUEUE_FULL]),
+            dropped_loss=int(self._endings.counts[LOSS] + cross[ARRIVED + LOSS]),
+            in_flight=inside + self._endings.held + self._packets_announced(),
         )
 
     def links(self) -> list[LinkUse]:
@@ -141,6 +140,9 @@ class PacketEngine:
             )
             for (origin, target), port in self._spec.ports.items()
         ]
+
+    def close(self) -> None:
+        """Do nothing: it holds nothing outside Python."""
 
     def _start_cross_flows(self) -> None:
         """Announce the first packet of each cross flow."""
@@ -183,50 +185,3 @@ class PacketEngine:
             draws[:DRAWS_CHUNK] = draws[DRAWS_CHUNK:]
             draws[DRAWS_CHUNK:] = next(self._supplies.chunks[number])
         self._memory.control[WANTS_DRAWS] = 0
-
-    def _outcome(self, until_ns: int) -> Outcome:
-        rows = np.concatenate(self._rows)
-        self._rows.clear()
-        is_delivered = rows[:, END_HOW] == DELIVERED
-        self._held = np.concatenate([self._held, self._records(rows[is_delivered], ARRIVAL)])
-        is_due = self._held["arrival_ns"] <= until_ns
-        arrivals = in_order(self._held[is_due])
-        self._held = self._held[~is_due]
-        drops = self._records(rows[~is_delivered], DROP)
-        drops["reason"] = rows[~is_delivered, END_HOW]
-        self._ended += np.bincount(drops["reason"], minlength=3)
-        self._ended[DELIVERED] += len(arrivals)
-        return Outcome(arrivals, drops)
-
-    def _records(self, rows: NDArray[np.int64], layout: "np.dtype[np.void]") -> NDArray[np.void]:
-        flows = rows[:, END_FLOW]
-        records = np.empty(len(rows), layout)
-        records[layout.names[0]] = rows[:, END_TIME]  # type: ignore[index]
-        records["source"] = self._flow_ends[flows, 0]
-        records["destination"] = self._flow_ends[flows, 1]
-        records["sequence"] = rows[:, END_SEQUENCE]
-        return records
-
-
-class _Pmu:
-    """When a source's frames leave it: after its processing time, and in order."""
-
-    def __init__(self, source: Source, seed: int) -> None:
-        self._processing_ns = source.processing_ns
-        self._chunks = (
-            None
-            if source.jitter is None
-            else jitters(seed, f"processing of {source.name}", source.jitter)
-        )
-        self._chunk: list[int] = []
-        self._last_ns = -1
-
-    def ready_ns(self, measured_ns: int) -> int:
-        """Return when the frame measured at an instant leaves."""
-        ready_ns = measured_ns + self._processing_ns
-        if self._chunks is not None:
-            if not self._chunk:
-                self._chunk = next(self._chunks).tolist()[::-1]
-            ready_ns += self._chunk.pop()
-        self._last_ns = max(self._last_ns, ready_ns)
-        return self._last_ns

@@ -1,0 +1,389 @@
+// The packet network as ns-3 objects, built and stepped from Python through cppyy.
+//
+// Nodes with an IPv4 stack, point-to-point devices and channels, drop-tail queues, static host
+// routes and UDP sockets are ns-3's own. Added here: what is counted, random numbers that come from
+// outside, the bytes of other link layers than PPP, and the order of simultaneous events.
+
+#ifndef TIELINE_NS3_MODEL_H
+#define TIELINE_NS3_MODEL_H
+
+#include "ns3/data-rate.h"
+#include "ns3/drop-tail-queue.h"
+#include "ns3/error-model.h"
+#include "ns3/inet-socket-address.h"
+#include "ns3/internet-stack-helper.h"
+#include "ns3/ipv4-l3-protocol.h"
+#include "ns3/ipv4-static-routing-helper.h"
+#include "ns3/ipv4-static-routing.h"
+#include "ns3/node.h"
+#include "ns3/object-factory.h"
+#include "ns3/packet.h"
+#include "ns3/point-to-point-channel.h"
+#include "ns3/point-to-point-net-device.h"
+#include "ns3/ppp-header.h"
+#include "ns3/queue-size.h"
+#include "ns3/scheduler.h"
+#include "ns3/simulator.h"
+#include "ns3/udp-socket-factory.h"
+#include "ns3/uinteger.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+namespace tieline
+{
+
+using ns3::Ptr;
+using ns3::Simulator;
+
+enum End
+{
+    DELIVERED,
+    QUEUE_FULL,
+    LOSS
+};
+
+// Orders simultaneous events as tieline's own packet engine does: ports that become free, then
+// packets and cross traffic in the order in which they were let into a queue or planned, then
+// frames, then the end of the step. ns-3 leaves this order open to its schedulers; its own take
+// the events as they were inserted.
+class TieOrder : public ns3::Scheduler
+{
+  public:
+    enum Turn : uint64_t
+    {
+        PORT,
+        PACKET,
+        FRAME,
+        END_OF_STEP
+    };
+
+    static ns3::TypeId GetTypeId()
+    {
+        static ns3::TypeId tid = ns3::TypeId("tieline::TieOrder")
+                                     .SetParent<ns3::Scheduler>()
+                                     .AddConstructor<TieOrder>();
+        return tid;
+    }
+
+    TieOrder()
+    {
+        s_current = this;
+    }
+
+    // ns-3 makes the scheduler in use itself.
+    static TieOrder& Current()
+    {
+        return *s_current;
+    }
+
+    // The next place in the order of packets.
+    uint64_t NextPlace()
+    {
+        return m_next_place++;
+    }
+
+    // The next event inserted takes this turn and place.
+    void Announce(Turn turn, uint64_t place)
+    {
+        m_announced = Rank(turn, place);
+        m_is_announced = true;
+    }
+
+    // The packet that a device hands to its channel next has this place.
+    void Hand(uint64_t place)
+    {
+        m_handed = place;
+    }
+
+    void Insert(const Event& event) override
+    {
+        uint64_t rank = Rank(PORT, 0);
+        if (m_is_announced)
+        {
+            rank = m_announced;
+            m_is_announced = false;
+        }
+        else if (event.key.m_context != Simulator::GetContext())
+        {
+            // A node plans events of its own for itself; only a channel does for another node.
+            rank = Rank(PACKET, m_handed);
+        }
+        m_heap.push_back({event, rank});
+        std::push_heap(m_heap.begin(), m_heap.end(), IsLater);
+    }
+
+    bool IsEmpty() const override
+    {
+        return m_heap.empty();
+    }
+
+    Event PeekNext() const override
+    {
+        return m_heap.front().event;
+    }
+
+    Event RemoveNext() override
+    {
+        std::pop_heap(m_heap.begin(), m_heap.end(), IsLater);
+        Event event = m_heap.back().event;
+        m_heap.pop_back();
+        return event;
+    }
+
+    void Remove(const Event& event) override
+    {
+        auto is_same = [&](const Entry& entry) { return entry.event == event; };
+        m_heap.erase(std::find_if(m_heap.begin(), m_heap.end(), is_same));
+        std::make_heap(m_heap.begin(), m_heap.end(), IsLater);
+    }
+
+  private:
+    struct Entry
+    {
+        Event event;
+        uint64_t rank;
+    };
+
+    static uint64_t Rank(Turn turn, uint64_t place)
+    {
+        return turn << 62 | place;
+    }
+
+    static bool IsLater(const Entry& a, const Entry& b)
+    {
+        if (a.event.key.m_ts != b.event.key.m_ts)
+        {
+            return a.event.key.m_ts > b.event.key.m_ts;
+        }
+        return a.rank != b.rank ? a.rank > b.rank : a.event.key.m_uid > b.event.key.m_uid;
+    }
+
+    inline static TieOrder* s_current = nullptr;
+    std::vector<Entry> m_heap;
+    uint64_t m_next_place = 1;
+    uint64_t m_handed = 0;
+    uint64_t m_announced = 0;
+    bool m_is_announced = false;
+};
+
+// Random numbers from outside. It stops the simulation when fewer than one chunk is left, so that
+// more can be given before the next event.
+class Supply
+{
+  public:
+    explicit Supply(size_t least)
+        : m_least(least)
+    {
+    }
+
+    void Add(const int64_t* values, size_t count)
+    {
+        m_values.insert(m_values.end(), values, values + count);
+    }
+
+    int64_t Take()
+    {
+        int64_t value = m_values.front();
+        m_values.pop_front();
+        if (IsLow())
+        {
+            Simulator::Stop();
+        }
+        return value;
+    }
+
+    bool IsLow() const
+    {
+        return m_values.size() < m_least;
+    }
+
+  private:
+    std::deque<int64_t> m_values;
+    size_t m_least;
+};
+
+// What becomes of the packets under way, by ns-3's number of each.
+class Ledger
+{
+  public:
+    struct Packet
+    {
+        int64_t flow;
+        int64_t sequence;
+        std::shared_ptr<const std::vector<uint8_t>> bytes; // none: cross traffic
+    };
+
+    explicit Ledger(int64_t pmu_flows)
+        : m_pmu_flows(pmu_flows)
+    {
+    }
+
+    void Begin(uint64_t uid, Packet packet)
+    {
+        m_packets.emplace(uid, std::move(packet));
+    }
+
+    const Packet* Find(uint64_t uid) const
+    {
+        auto found = m_packets.find(uid);
+        return found == m_packets.end() ? nullptr : &found->second;
+    }
+
+    void Close(uint64_t uid, End how)
+    {
+        const Packet* packet = Find(uid);
+        if (packet == nullptr)
+        {
+            Blame("a packet that nobody sent came to its end");
+            return;
+        }
+        if (packet->flow < m_pmu_flows)
+        {
+            m_ended.insert(m_ended.end(),
+                           {Simulator::Now().GetNanoSeconds(), packet->flow, packet->sequence, how});
+        }
+        else
+        {
+            m_cross_ended[how]++;
+        }
+        m_packets.erase(uid);
+    }
+
+    // Note what should not happen; only the first counts.
+    void Blame(const std::string& fault)
+    {
+        m_fault = m_fault.empty() ? fault : m_fault;
+    }
+
+    std::unordered_map<uint64_t, Packet> m_packets;
+    std::vector<int64_t> m_ended; // time, flow, sequence, how, of PMU packets
+    int64_t m_cross_ended[3] = {0, 0, 0};
+    std::string m_fault;
+
+  private:
+    int64_t m_pmu_flows;
+};
+
+// ns-3's drop-tail queue, which puts the link layer's bytes around a packet and counts.
+//
+// A device asks it for a packet when it begins to transmit, and gets none when it has become idle.
+// Bytes beyond PPP's two trail, and the IP layer at the far end cuts them off; with fewer than two
+// the PPP header is left out on the link.
+class LinkQueue : public ns3::DropTailQueue<ns3::Packet>
+{
+  public:
+    static constexpr int64_t PPP_BYTES = 2;
+
+    LinkQueue(Ledger& ledger, ns3::DataRate rate, int64_t overhead_bytes)
+        : m_ledger(ledger),
+          m_rate(rate),
+          m_overhead_bytes(overhead_bytes)
+    {
+    }
+
+    bool HasPpp() const
+    {
+        return m_overhead_bytes >= PPP_BYTES;
+    }
+
+    bool Enqueue(Ptr<ns3::Packet> packet) override
+    {
+        if (!HasPpp())
+        {
+            packet->RemoveAtStart(PPP_BYTES);
+        }
+        packet->AddPaddingAtEnd(m_overhead_bytes - (HasPpp() ? PPP_BYTES : 0));
+        if (!DropTailQueue::Enqueue(packet))
+        {
+            m_dropped_queue++;
+            m_ledger.Close(packet->GetUid(), QUEUE_FULL);
+            return false;
+        }
+        m_places.push_back(TieOrder::Current().NextPlace());
+        m_packets++;
+        m_bytes += packet->GetSize();
+        if (m_is_busy)
+        {
+            m_most_waiting = std::max<int64_t>(m_most_waiting, GetNPackets());
+        }
+        return true;
+    }
+
+    Ptr<ns3::Packet> Dequeue() override
+    {
+        Ptr<ns3::Packet> packet = DropTailQueue::Dequeue();
+        m_is_busy = packet != nullptr;
+        if (m_is_busy)
+        {
+            TieOrder::Current().Hand(m_places.front());
+            m_places.pop_front();
+            int64_t service_ns = m_rate.CalculateBytesTxTime(packet->GetSize()).GetNanoSeconds();
+            m_busy_ns += service_ns;
+            m_free_at_ns = Simulator::Now().GetNanoSeconds() + service_ns;
+        }
+        return packet;
+    }
+
+    int64_t m_packets = 0;
+    int64_t m_bytes = 0;
+    int64_t m_dropped_queue = 0;
+    int64_t m_dropped_loss = 0;
+    int64_t m_busy_ns = 0;
+    int64_t m_free_at_ns = 0;
+    int64_t m_most_waiting = 0;
+
+  private:
+    Ledger& m_ledger;
+    ns3::DataRate m_rate;
+    int64_t m_overhead_bytes;
+    bool m_is_busy = false;
+    std::deque<uint64_t> m_places;
+};
+
+// The receiving end of a link: packets are lost as the supply says (1: lost).
+class LinkErrors : public ns3::ErrorModel
+{
+  public:
+    LinkErrors(Ledger& ledger, Ptr<LinkQueue> queue, Supply* losses)
+        : m_ledger(ledger),
+          m_queue(queue),
+          m_losses(losses)
+    {
+    }
+
+  private:
+    bool DoCorrupt(Ptr<ns3::Packet> packet) override
+    {
+        if (!m_queue->HasPpp())
+        {
+            ns3::PppHeader header;
+            header.SetProtocol(0x0021); // IPv4
+            packet->AddHeader(header);
+        }
+        if (m_losses == nullptr || m_losses->Take() == 0)
+        {
+            return false;
+        }
+        m_queue->m_dropped_loss++;
+        m_ledger.Close(packet->GetUid(), LOSS);
+        return true;
+    }
+
+    void DoReset() override
+    {
+    }
+
+    Ledger& m_ledger;
+    Ptr<LinkQueue> m_queue;
+    Supply* m_losses;
+};
+
+} // namespace tieline
+
+#endif
