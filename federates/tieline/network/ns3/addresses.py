@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tieline.network.spec import NetworkSpec
+from tieline.network.spec import NetworkSpec, Route
 
 
 @dataclass(frozen=True)
@@ -11,6 +11,11 @@ class Address:
 
     node: str
     next_port: dict[str, int]
+
+
+def routes_of(spec: NetworkSpec) -> list[Route]:
+    """Return the routes of the PMU flows, then those of the cross flows."""
+    return [flow.route for flow in spec.flows] + [flow.route for flow in spec.cross_flows]
 
 
 def addressed(spec: NetworkSpec) -> tuple[list[Address], list[int]]:
@@ -23,9 +28,9 @@ def addressed(spec: NetworkSpec) -> tuple[list[Address], list[int]]:
     addresses: list[Address] = []
     of_node: dict[str, list[int]] = {}
     numbers = []
-    for flow in (*spec.flows, *spec.cross_flows):
-        node = flow.route[-1]
-        ports = {at: port for at, (port, _) in zip(flow.route, spec.hops(flow.route), strict=False)}
+    for route in routes_of(spec):
+        node = route[-1]
+        ports = {at: port for at, (port, _) in zip(route, spec.hops(route), strict=False)}
         own = of_node.setdefault(node, [])
         number = next((n for n in own if _agree(addresses[n].next_port, ports)), None)
         if number is None:

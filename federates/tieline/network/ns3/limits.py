@@ -5,6 +5,7 @@ from dataclasses import MISSING, fields
 from typing import Any
 
 from tieline.errors import InputError
+from tieline.network.ns3.addresses import routes_of
 from tieline.network.ns3.library import check_installed
 from tieline.network.spec import NetworkSpec
 
@@ -45,14 +46,14 @@ def _findings(spec: NetworkSpec) -> Iterator[str]:
         yield from _beyond("PMU", f" {source.name}", source)
     for destination in spec.destinations:
         yield from _beyond("controller", f" {destination.name}", destination)
-    for flow in (*spec.flows, *spec.cross_flows):
-        if len(flow.route) - 1 > MOST_HOPS:
+    for route in routes_of(spec):
+        if len(route) - 1 > MOST_HOPS:
             yield (
                 f"network.engine ns3 carries packets over at most {MOST_HOPS} links"
-                f" (got {len(flow.route) - 1} from {flow.route[0]} to {flow.route[-1]})"
+                f" (got {len(route) - 1} from {route[0]} to {route[-1]})"
             )
-    for number, pmu_flow in enumerate(spec.flows):
-        yield from _beyond("flow", f" {number}", pmu_flow)
+    for number, flow in enumerate(spec.flows):
+        yield from _beyond("flow", f" {number}", flow)
     for cross in spec.cross_flows:
         yield from _beyond("cross flow", f" {cross.name}", cross)
         if cross.kind not in _KINDS:
