@@ -16,7 +16,9 @@ from scenarios.study import run
 from tieline.errors import InputError
 from tieline.network.ns3 import library, limits
 from tieline.network.ns3.addresses import addressed
+from tieline.network.ns3.build import rate_for_ns3
 from tieline.network.packet import PacketEngine
+from tieline.network.spec import service_ns
 
 TESTS = Path(__file__).parents[1]
 
@@ -146,6 +148,20 @@ def test_a_route_longer_than_the_time_to_live_is_refused(monkeypatch: pytest.Mon
     limits.check_carried(chain([(10**7, 0)] * limits.MOST_HOPS))
     with pytest.raises(InputError, match="at most 254 links"):
         limits.check_carried(chain([(10**7, 0)] * (limits.MOST_HOPS + 1)))
+
+
+def test_a_rate_is_chosen_at_which_ns3_rounds_as_the_specification_does() -> None:
+    """Otherwise a queue behind such a link would drift by a nanosecond a packet."""
+    [link] = chain([(128_000_000, 0)], overhead_bytes=9).links
+
+    def rounding_down(rate_bps: int, size_bytes: int) -> int:
+        return (8 * size_bytes * 10**9 - 1) // rate_bps
+
+    # 71 bytes take 4437.5 ns, and one bit a second less makes them 4437.500035 ns.
+    assert service_ns(link, 34) == 4438
+    assert rate_for_ns3(link, {34}, lambda rate, size: 4437 + (rate < 128_000_000)) == 127_999_999
+    with pytest.raises(InputError, match=r"cannot serialise packets of \[71\] bytes .*link n0-n1"):
+        rate_for_ns3(link, {34}, rounding_down)
 
 
 def test_flows_share_an_address_only_where_their_routes_agree() -> None:

@@ -1,6 +1,6 @@
 """Builds a `NetworkSpec` from ns-3's objects."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from tieline.errors import CosimError, InputError
@@ -30,10 +30,14 @@ def built(spec: NetworkSpec, supplies: Supplies, traces: Traces) -> tuple[Any, d
         CosimError: another network is open.
     """
     check_carried(spec)
+    rates_bps = [
+        rate_for_ns3(link, sizes, model().Network.ServiceNs)
+        for link, sizes in zip(spec.links, _payloads(spec), strict=True)
+    ]
     if model().Network.IsOpen():
         raise CosimError("ns-3 simulates one network at a time: close the other engine first")
     builder = _Builder(spec, supplies)
-    builder.add_links()
+    builder.add_links(rates_bps)
     builder.add_flows(traces)
     return builder.network, builder.filled
 
@@ -46,13 +50,13 @@ class _Builder:
         self._supplies = supplies
         self._numbers = {node.name: number for number, node in enumerate(spec.nodes)}
 
-    def add_links(self) -> None:
+    def add_links(self, rates_bps: Sequence[int]) -> None:
         """Add every link, whose ports get the numbers of the specification."""
-        for link, payloads in zip(self._spec.links, _payloads(self._spec), strict=True):
+        for link, rate_bps in zip(self._spec.links, rates_bps, strict=True):
             self.network.AddLink(
                 self._numbers[link.a],
                 self._numbers[link.b],
-                _rate_bps(link, payloads, model().Network.ServiceNs),
+                rate_bps,
                 link.propagation_ns,
                 link.queue_packets,
                 link.overhead_bytes,
@@ -106,7 +110,7 @@ def _payloads(spec: NetworkSpec) -> list[set[int]]:
     return sizes
 
 
-def _rate_bps(link: Link, payloads: set[int], found_ns: Callable[[int, int], int]) -> int:
+def rate_for_ns3(link: Link, payloads: set[int], found_ns: Callable[[int, int], int]) -> int:
     """Return the rate at which ns-3 finds the link's own serialisation times.
 
     ns-3's fixed-point arithmetic rounds half a nanosecond down at some rates, where one bit a

@@ -1,14 +1,17 @@
-// A whole network of ns-3 nodes, links, routes and sockets, with the flows that use it.
+// A whole network with the flows that use it, built and stepped from Python through cppyy.
 
 #ifndef TIELINE_NS3_NETWORK_H
 #define TIELINE_NS3_NETWORK_H
 
-#include "model.h"
+#include "topology.h"
+
+#include "ns3/inet-socket-address.h"
+#include "ns3/udp-socket-factory.h"
 
 namespace tieline
 {
 
-class Network
+class Network : public Topology
 {
   public:
     static constexpr uint16_t FIRST_PORT = 10000;
@@ -17,24 +20,9 @@ class Network
 
     // Args: nodes, how many; pmu_flows, whose numbers come before those of the cross flows.
     Network(int64_t nodes, int64_t pmu_flows)
-        : m_ledger(pmu_flows)
+        : Topology(nodes, pmu_flows)
     {
         s_is_open = true;
-        ns3::ObjectFactory order;
-        order.SetTypeId(TieOrder::GetTypeId());
-        Simulator::SetScheduler(order);
-        ns3::InternetStackHelper stack;
-        stack.SetIpv6StackInstall(false);
-        stack.SetRoutingHelper(ns3::Ipv4StaticRoutingHelper());
-        for (int64_t number = 0; number < nodes; number++)
-        {
-            Ptr<ns3::Node> node = ns3::CreateObject<ns3::Node>();
-            stack.Install(node);
-            auto ip = node->GetObject<ns3::Ipv4L3Protocol>();
-            ip->SetAttribute("DefaultTtl", ns3::UintegerValue(255));
-            ip->TraceConnectWithoutContext("Drop", ns3::MakeCallback(&Network::DroppedByIp, this));
-            m_nodes.push_back(node);
-        }
     }
 
     // It takes everything with it that ns-3 holds in this process.
@@ -48,77 +36,6 @@ class Network
     static bool IsOpen()
     {
         return s_is_open;
-    }
-
-    // The serialisation time that ns-3 finds, ns.
-    static int64_t ServiceNs(uint64_t rate_bps, uint32_t bytes)
-    {
-        return ns3::DataRate(rate_bps).CalculateBytesTxTime(bytes).GetNanoSeconds();
-    }
-
-    // Return the number of a new supply of random numbers.
-    int64_t AddSupply(size_t least)
-    {
-        m_supplies.emplace_back(least);
-        return m_supplies.size() - 1;
-    }
-
-    void Fill(int64_t supply, const int64_t* values, size_t count)
-    {
-        m_supplies[supply].Add(values, count);
-    }
-
-    bool IsLow(int64_t supply) const
-    {
-        return m_supplies[supply].IsLow();
-    }
-
-    // Join two nodes; the port from a to b has an even number, the one back the next.
-    // loss_there, loss_back: supplies of losses, or -1 for none.
-    void AddLink(int64_t a,
-                 int64_t b,
-                 uint64_t rate_bps,
-                 int64_t propagation_ns,
-                 uint32_t queue,
-                 int64_t overhead_bytes,
-                 int64_t loss_there,
-                 int64_t loss_back)
-    {
-        auto channel = ns3::CreateObject<ns3::PointToPointChannel>();
-        channel->SetAttribute("Delay", ns3::TimeValue(ns3::NanoSeconds(propagation_ns)));
-        ns3::DataRate rate(rate_bps);
-        for (int64_t node : {a, b})
-        {
-            auto device = ns3::CreateObject<ns3::PointToPointNetDevice>();
-            auto fifo = ns3::CreateObject<LinkQueue>(m_ledger, rate, overhead_bytes);
-            fifo->SetMaxSize(ns3::QueueSize(ns3::PACKETS, queue));
-            device->SetDataRate(rate);
-            device->SetMtu(65535); // nothing is fragmented
-            device->SetQueue(fifo);
-            device->Attach(channel);
-            m_nodes[node]->AddDevice(device);
-            m_ports.push_back({device, fifo, 0, LinkAddress(m_ports.size())});
-            Address(m_ports.back(), m_nodes[node]);
-        }
-        Port& there = m_ports[m_ports.size() - 2];
-        Port& back = m_ports[m_ports.size() - 1];
-        Damage(back.device, there.queue, loss_there);
-        Damage(there.device, back.queue, loss_back);
-    }
-
-    // Give a node the address of this number, besides those of its links.
-    void AddAddress(int64_t node, uint32_t address)
-    {
-        auto ip = m_nodes[node]->GetObject<ns3::Ipv4>();
-        ip->AddAddress(0, {HostAddress(address), ns3::Ipv4Mask::GetOnes()});
-        Routes(m_nodes[node])->AddHostRouteTo(HostAddress(address), 0);
-    }
-
-    // Send what goes to an address out of a port of the node that the port belongs to.
-    void AddRoute(uint32_t address, int64_t port)
-    {
-        Routes(m_ports[port].device->GetNode())
-            ->AddHostRouteTo(HostAddress(address), m_ports[port ^ 1].address, m_ports[port].interface);
     }
 
     void AddSource(int64_t node)
@@ -232,8 +149,8 @@ class Network
         {
             const LinkQueue& queue = *port.queue;
             int64_t ahead_ns = queue.m_free_at_ns - Simulator::Now().GetNanoSeconds();
-            *rows++ = queue.m_packets;
-            *rows++ = queue.m_bytes;
+            *rows++ = queue.m_carried_packets;
+            *rows++ = queue.m_carried_bytes;
             *rows++ = queue.m_dropped_queue;
             *rows++ = queue.m_dropped_loss;
             *rows++ = queue.m_busy_ns - std::max<int64_t>(0, ahead_ns);
@@ -242,14 +159,6 @@ class Network
     }
 
   private:
-    struct Port
-    {
-        Ptr<ns3::PointToPointNetDevice> device;
-        Ptr<LinkQueue> queue;
-        uint32_t interface;
-        ns3::Ipv4Address address;
-    };
-
     struct Flow
     {
         int64_t number;
@@ -290,40 +199,6 @@ class Network
         return destination == CROSS ? DISCARD_PORT : FIRST_PORT + destination;
     }
 
-    // 172.16.0.0/12 for flows, 10.0.0.0/8 in blocks of four for links.
-    static ns3::Ipv4Address HostAddress(uint32_t number)
-    {
-        return ns3::Ipv4Address(0xAC100001 + number);
-    }
-
-    static ns3::Ipv4Address LinkAddress(uint32_t port)
-    {
-        return ns3::Ipv4Address(0x0A000001 + 4 * (port / 2) + port % 2);
-    }
-
-    static void Address(Port& port, Ptr<ns3::Node> node)
-    {
-        auto ip = node->GetObject<ns3::Ipv4>();
-        port.interface = ip->AddInterface(port.device);
-        ip->AddAddress(port.interface, {port.address, ns3::Ipv4Mask(0xFFFFFFFC)});
-        ip->SetUp(port.interface);
-    }
-
-    static Ptr<ns3::Ipv4StaticRouting> Routes(Ptr<ns3::Node> node)
-    {
-        auto protocol = node->GetObject<ns3::Ipv4>()->GetRoutingProtocol();
-        return ns3::DynamicCast<ns3::Ipv4StaticRouting>(protocol);
-    }
-
-    void Damage(Ptr<ns3::PointToPointNetDevice> device, Ptr<LinkQueue> queue, int64_t losses)
-    {
-        if (losses >= 0 || !queue->HasPpp())
-        {
-            Supply* supply = losses < 0 ? nullptr : &m_supplies[losses];
-            device->SetReceiveErrorModel(ns3::CreateObject<LinkErrors>(m_ledger, queue, supply));
-        }
-    }
-
     Ptr<ns3::Socket> OpenSocket(int64_t node) const
     {
         auto kind = ns3::UdpSocketFactory::GetTypeId();
@@ -333,7 +208,9 @@ class Network
         return socket;
     }
 
-    void SendFrame(int64_t source, int64_t sequence, std::shared_ptr<const std::vector<uint8_t>> frame)
+    void SendFrame(int64_t source,
+                   int64_t sequence,
+                   std::shared_ptr<const std::vector<uint8_t>> frame)
     {
         m_announced -= m_sources[source].flows.size();
         for (const Flow& flow : m_sources[source].flows)
@@ -358,12 +235,16 @@ class Network
         Simulator::ScheduleWithContext(context, gap, &Network::SendCross, this, cross);
     }
 
-    void Send(Ptr<ns3::Socket> socket, Ptr<ns3::Packet> packet, const Flow& flow, Ledger::Packet entry)
+    void Send(Ptr<ns3::Socket> socket,
+              Ptr<ns3::Packet> packet,
+              const Flow& flow,
+              Ledger::Packet entry)
     {
         m_ledger.Begin(packet->GetUid(), std::move(entry));
         if (socket->SendTo(packet, 0, flow.to) < 0)
         {
-            m_ledger.Blame("a socket could not send to flow " + std::to_string(flow.number) + " (error " + std::to_string(socket->GetErrno()) + ")");
+            m_ledger.Blame("a socket could not send to flow " + std::to_string(flow.number) +
+                           " (error " + std::to_string(socket->GetErrno()) + ")");
         }
     }
 
@@ -384,32 +265,19 @@ class Network
         m_ledger.Close(packet->GetUid(), DELIVERED);
     }
 
-    void DroppedByIp(const ns3::Ipv4Header&,
-                     Ptr<const ns3::Packet>,
-                     ns3::Ipv4L3Protocol::DropReason reason,
-                     Ptr<ns3::Ipv4>,
-                     uint32_t)
-    {
-        m_ledger.Blame("IP dropped a packet for reason " + std::to_string(reason));
-    }
-
     void EndStep()
     {
         m_is_at_end = true;
         Simulator::Stop();
     }
 
-    Ledger m_ledger;
-    std::vector<Ptr<ns3::Node>> m_nodes;
-    std::vector<Port> m_ports;
+    inline static bool s_is_open = false;
     std::vector<Source> m_sources;
     std::vector<int64_t> m_destinations; // of each PMU flow
     // ns-3 keeps pointers into these: they must not move.
-    std::deque<Supply> m_supplies;
     std::deque<Receiver> m_receivers;
     std::deque<Cross> m_crosses;
     std::vector<uint8_t> m_buffer;
-    inline static bool s_is_open = false;
     uint64_t m_frames = 0;
     int64_t m_announced = 0;
     int64_t m_cross_sent = 0;
