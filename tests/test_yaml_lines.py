@@ -3,8 +3,11 @@
 from pathlib import Path
 
 import pytest
+import yaml
 
+from tieline import yaml_lines
 from tieline.errors import InputError
+from tieline.resources import shipped
 from tieline.yaml_lines import Document, load
 
 TEXT = """\
@@ -107,3 +110,16 @@ def test_files_that_cannot_be_read_are_refused(tmp_path):
     path.write_bytes(b"a: \xe9\n")
     with pytest.raises(InputError, match="not UTF-8"):
         load(path)
+
+
+def test_both_parsers_read_every_shipped_file_alike():
+    """Otherwise a result would depend on whether PyYAML was built with its parser in C."""
+    files = [*shipped("cases").rglob("*.yaml"), *shipped("configs").rglob("*.yaml")]
+    for path in files:
+        text = path.read_text(encoding="utf-8")
+        fast, slow = (
+            yaml_lines._read_with(kind, path, text) for kind in (yaml_lines._FAST, yaml.SafeLoader)
+        )
+        assert fast.data == slow.data
+        assert fast._lines == slow._lines
+    assert len(files) > 10

@@ -1,8 +1,5 @@
 """The command line: every `tieline` command, thin; what it does stands in the packages."""
 
-import traceback
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,9 +7,11 @@ import typer
 from rich.console import Console
 
 import tieline
-from tieline.errors import InputError, TielineError
+from tieline.console import reporting, say
+from tieline.errors import InputError
 from tieline.experiment.load import load_experiment, shipped_experiments
 from tieline.resources import shipped
+from tieline.topology_cli import topology
 from tieline.yaml_lines import load as load_yaml
 
 if TYPE_CHECKING:
@@ -30,10 +29,9 @@ WITHOUT_NAME = """Give the name of a shipped experiment, or the path of a YAML f
     tieline run g26_trip --set grid.pss.gain=5     a shipped one with a setting changed
     tieline run my_experiment.yaml --out my_result
 """
-INTERRUPTED = 130
-UNEXPECTED = 1
 
 app = typer.Typer(help=HELP, add_completion=False, rich_markup_mode=None)
+app.add_typer(topology)
 
 Reference = Annotated[str, typer.Argument(metavar="CONFIG|NAME", help="a file, or a shipped name")]
 Settings = Annotated[
@@ -268,37 +266,6 @@ def catalogue() -> str:
     for path in sorted(shipped("cases").glob("*/case.yaml")):
         lines.append(f"  {path.parent.name}: {load_yaml(path).data.get('title', '')}")
     return "\n".join(lines)
-
-
-def say(text: str) -> None:
-    """Print text as it is."""
-    Console().print(text, markup=False, highlight=False, soft_wrap=True)
-
-
-@contextmanager
-def reporting(debug: bool = False) -> Iterator[None]:
-    """Turn an error into its message and exit code, with its traceback when debugging."""
-    try:
-        yield
-    except (typer.Exit, typer.Abort):
-        raise
-    except KeyboardInterrupt:
-        _complain("interrupted", debug)
-        raise typer.Exit(INTERRUPTED) from None
-    except TielineError as error:
-        _complain(str(error), debug)
-        raise typer.Exit(error.exit_code) from None
-    except Exception as error:
-        advice = "" if debug else "; --debug shows where it arose"
-        _complain(f"unexpected {type(error).__name__}: {error}{advice}", debug)
-        raise typer.Exit(UNEXPECTED) from None
-
-
-def _complain(message: str, debug: bool) -> None:
-    console = Console(stderr=True)
-    if debug:
-        console.print(traceback.format_exc(), markup=False, highlight=False, soft_wrap=True)
-    console.print(message, markup=False, highlight=False, soft_wrap=True)
 
 
 def _run(reference: str, options: list[str], out: Path | None) -> None:

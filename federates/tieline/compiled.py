@@ -66,6 +66,14 @@ def compiled(function: Function) -> Function:
     return numba.njit(cache=True, nogil=True, error_model="numpy")(function)
 
 
+def inlined(function: Function) -> Function:
+    """Return `function` as `compiled` does, put into each of its callers in place of a call."""
+    if not IS_ON:
+        return function
+    options = {"cache": True, "nogil": True, "error_model": "numpy", "forceinline": True}
+    return numba.njit(**options)(function)
+
+
 def first_class(functions: Sequence[Callable[..., None]], signature: Any) -> Any:
     """Return functions of one signature as a list that compiled code can call by index.
 

@@ -14,6 +14,8 @@ Position = tuple[Key, ...]
 MAX_VALUES = 200_000
 """Values that a document may hold with its aliases written out; a few nested aliases reach it."""
 
+_FAST = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
 _PLAIN_TAGS = ("tag:yaml.org,2002:map", "tag:yaml.org,2002:seq")
 
 
@@ -73,7 +75,15 @@ def load(path: Path) -> Document:
 
 
 def _parsed(path: Path, text: str) -> Document:
-    loader = yaml.SafeLoader(text)
+    try:
+        return _read_with(_FAST, path, text)
+    except (yaml.YAMLError, InputError):
+        # The parser in C, ten times as fast, words its complaints in another way.
+        return _read_with(yaml.SafeLoader, path, text)
+
+
+def _read_with(kind: Any, path: Path, text: str) -> Document:
+    loader = kind(text)
     try:
         root = loader.get_single_node()
         reader = _Reader(path, loader)

@@ -22,6 +22,9 @@ BAD_SETTINGS = [
     ("name.first=x", ["'name' is a single value"]),
     ("grid=3", ["grid must be a group of keys", "3"]),
     ("network.engine=constant", ["network.engine constant needs network.delay"]),
+    ("network.engine=helics-filters", ["network.engine helics-filters needs network.delay"]),
+    ("network.engine=empirical", ["network.engine empirical needs network.empirical"]),
+    ("network.empirical={}", ["must have either a 'trace' or a 'distribution'"]),
     ("wams.reporting=continuous", ["needs network.engine ideal or constant"]),
 ]
 

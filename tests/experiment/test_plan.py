@@ -12,6 +12,7 @@ from tieline.experiment.load import load_experiment
 from tieline.experiment.plan import canonical_json, config_hash, prepare
 from tieline.experiment.schema import Experiment
 from tieline.experiment.sites import Sites
+from tieline.resources import shipped
 
 
 def test_the_run_file_holds_all_that_a_federate_needs(tmp_path: Path) -> None:
@@ -47,6 +48,17 @@ def test_a_topology_is_found_beside_the_experiment(tmp_path: Path) -> None:
     (planned,) = prepare(study, known_sites).runs
     assert planned.run["network"]["topology"] == str((tmp_path / "net.yaml").resolve())
     assert len(planned.inputs["topology"]) == 64
+
+
+def test_a_topology_of_the_case_is_found_by_its_name(tmp_path: Path) -> None:
+    """Otherwise an installed tieline's second network could be used by nobody."""
+    (tmp_path / "tiny.yaml").write_text(EXPERIMENT)
+    study = load_experiment(str(tmp_path / "tiny.yaml"), ["network.topology=wan"])
+    (planned,) = prepare(study, known_sites).runs
+    assert planned.run["network"]["topology"] == str(shipped("cases") / "miniwecc" / "wan.yaml")
+    study = load_experiment(str(tmp_path / "tiny.yaml"), ["network.topology=wam"])
+    with pytest.raises(InputError, match=r"the case has: case, wan; did you mean 'wan'"):
+        prepare(study, known_sites)
 
 
 def test_a_missing_topology_or_case_is_located(tmp_path: Path) -> None:

@@ -9,11 +9,12 @@ import numpy as np
 
 from tieline.network.engine import Engine, Outcome
 from tieline.network.jitter import GammaJitter, NormalJitter, UniformJitter
+from tieline.network.losses import Bernoulli
 from tieline.network.packet import PacketEngine
+from tieline.network.queues import DropTail
 from tieline.network.routing import routes_from
 from tieline.network.spec import (
     FRAME_BYTES,
-    HEADER_BYTES,
     CrossFlow,
     Destination,
     Flow,
@@ -22,6 +23,7 @@ from tieline.network.spec import (
     Node,
     Source,
 )
+from tieline.network.traffic import HEADER_BYTES, Cbr, Poisson
 
 ALL = 10**15
 """An instant after everything, ns."""
@@ -68,7 +70,7 @@ def chain(links: Sequence[tuple[int, int]], queue: int = 100, **more: object) ->
     """
     names = [f"n{i}" for i in range(len(links) + 1)]
     made = [
-        Link(a, b, rate, propagation, queue, **more)  # type: ignore[arg-type]
+        Link(a, b, rate, propagation, DropTail(queue), **more)  # type: ignore[arg-type]
         for (a, b), (rate, propagation) in zip(pairwise(names), links, strict=True)
     ]
     return joined(made, [Source("p", 1, names[0])], [Destination("c", "G", 2, names[-1])])
@@ -77,10 +79,28 @@ def chain(links: Sequence[tuple[int, int]], queue: int = 100, **more: object) ->
 def busy_ring() -> NetworkSpec:
     """Return four nodes in a ring that overload, lose, re-order and delay at every stage."""
     links = [
-        Link("a", "b", 2_000_000, 700_000, 20, 0.02, UniformJitter(0, 400_000), 9),
-        Link("b", "c", 1_500_000, 900_000, 5, 0.0, NormalJitter(200_000, 90_000), 9),
-        Link("c", "d", 2_500_000, 600_000, 30, 0.05, GammaJitter(100_000, 150_000), 9),
-        Link("a", "d", 1_000_000, 800_000, 3, 0.0, None, 9),
+        Link(
+            "a",
+            "b",
+            2_000_000,
+            700_000,
+            DropTail(20),
+            Bernoulli(0.02),
+            UniformJitter(0, 400_000),
+            9,
+        ),
+        Link("b", "c", 1_500_000, 900_000, DropTail(5), None, NormalJitter(200_000, 90_000), 9),
+        Link(
+            "c",
+            "d",
+            2_500_000,
+            600_000,
+            DropTail(30),
+            Bernoulli(0.05),
+            GammaJitter(100_000, 150_000),
+            9,
+        ),
+        Link("a", "d", 1_000_000, 800_000, DropTail(3), None, None, 9),
     ]
     sources = [
         Source("p0", 1, "a", 3_000_000, UniformJitter(0, 2_000_000)),
@@ -92,8 +112,8 @@ def busy_ring() -> NetworkSpec:
         Destination("c2", "G2", 3, "d", 20_000_000),
     ]
     cross = [
-        CrossFlow("poisson", "poisson", 900_000, 200, ("a", "c")),
-        CrossFlow("cbr", "cbr", 700_000, 472, ("d", "b")),
+        CrossFlow("poisson", Poisson(900_000, 200), ("a", "c")),
+        CrossFlow("cbr", Cbr(700_000, 472), ("d", "b")),
     ]
     return joined(links, sources, destinations, cross)
 

@@ -1,16 +1,18 @@
 """Networks that ns-3 and tieline's own engine both carry frames through."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from network.builders import busy_ring, carried, chain, joined
 from network.test_ns3_reference import wide_area_network
 from tieline.network.engine import Counts, Engine, LinkUse
 from tieline.network.jitter import NormalJitter, UniformJitter
+from tieline.network.losses import Bernoulli, BitError, GilbertElliott
+from tieline.network.queues import DropTail
 from tieline.network.spec import CrossFlow, Destination, Flow, Link, NetworkSpec, Node, Source
+from tieline.network.traffic import Cbr, OnOff, Poisson, Trace
 
 FRAMES = [(k * 10**9 // 60, k) for k in range(20)]
 TICK_NS = 248_000
@@ -26,7 +28,6 @@ class Case:
 
     spec: NetworkSpec
     seed: int = 3
-    traces: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
     frames: Sequence[tuple[int, int]] = tuple(FRAMES)
     steps: Sequence[int] = ()
     until_ns: int | None = None
@@ -40,11 +41,12 @@ class Fate:
     drops: bytes
     counts: Counts
     links: list[LinkUse]
+    counters: bytes
 
 
 def fate(make: Callable[..., Engine], case: Case) -> Fate:
     """Return what an engine makes of a case."""
-    engine = make(case.spec, case.seed, case.traces)
+    engine = make(case.spec, case.seed)
     sources = len(case.spec.sources)
     if case.until_ns is None:
         outcome = carried(engine, case.frames, case.steps, sources)
@@ -52,40 +54,52 @@ def fate(make: Callable[..., Engine], case: Case) -> Fate:
         for measured_ns, sequence in case.frames:
             engine.send(measured_ns, np.arange(sources), sequence)
         outcome = engine.run_until(case.until_ns)
+    counters = engine.link_counters().tobytes() + engine.link_counters().tobytes()
     result = Fate(
-        outcome.arrivals.tobytes(), outcome.drops.tobytes(), engine.counts(), engine.links()
+        outcome.arrivals.tobytes(),
+        outcome.drops.tobytes(),
+        engine.counts(),
+        engine.links(),
+        counters,
     )
     engine.close()
     return result
 
 
 def link_layers() -> NetworkSpec:
-    """Return a lossy chain whose link layers and rates differ, one of half nanoseconds."""
-    spec = chain([(10_000_000, 10**6)] * 5, loss_probability=0.05)
+    """Return a lossy chain whose link layers, losses and rates differ, one of half nanoseconds."""
+    spec = chain([(10_000_000, 10**6)] * 5, loss=Bernoulli(0.05))
     overheads = (0, 1, 2, 9, 40)
     rates = (10_000_000, 128_000_000, 1_500_000, 128_000_000, 7_000_000)
+    losses = (Bernoulli(0.02), None, BitError(1e-4), GilbertElliott(0.01, 0.2), None)
     links = [
-        replace(link, overhead_bytes=overhead, rate_bps=rate)
-        for link, overhead, rate in zip(spec.links, overheads, rates, strict=True)
+        replace(link, overhead_bytes=overhead, rate_bps=rate, loss=loss)
+        for link, overhead, rate, loss in zip(spec.links, overheads, rates, losses, strict=True)
     ]
     return replace(spec, links=tuple(links))
 
 
 def busy_star() -> NetworkSpec:
     """Return six equal spokes, each with a PMU, a controller and cross traffic in rounds."""
-    links = [Link("hub", f"s{i}", 10_000_000, 10**6, 20, overhead_bytes=9) for i in range(6)]
+    links = [
+        Link("hub", f"s{i}", 10_000_000, 10**6, DropTail(20), overhead_bytes=9) for i in range(6)
+    ]
     sources = [Source(f"p{i}", i, f"s{i}") for i in range(6)]
     destinations = [Destination(f"c{i}", f"G{i}", i, f"s{i}") for i in range(6)]
     cross = [
-        CrossFlow("poisson", "poisson", 4_000_000, 200, ("s0", "s1")),
-        CrossFlow("cbr", "cbr", 5_000_000, 1200, ("s2", "s1")),
+        CrossFlow("poisson", Poisson(4_000_000, 200), ("s0", "s1"), dscp=46),
+        CrossFlow("cbr", Cbr(5_000_000, 1200), ("s2", "s1"), stop_ns=500_000_000),
+        CrossFlow("on-off", OnOff(8e6, 700, 10**7, 10**7, 1.5), ("s3", "s1"), start_ns=10**8),
     ]
     return joined(links, sources, destinations, cross)
 
 
 def overloaded() -> NetworkSpec:
-    """Return twelve PMUs whose frames do not fit through one slow link with a short queue."""
-    links = [Link("a", "b", 10_000_000, 10**6, 30), Link("b", "c", 256_000, 10**6, 7)]
+    """Return twelve PMUs whose frames do not fit through slow links with short queues."""
+    links = [
+        Link("a", "b", 1_000_000, 10**6, DropTail(30, 1_500), overhead_bytes=9),
+        Link("b", "c", 256_000, 10**6, DropTail(7)),
+    ]
     sources = [Source(f"p{i}", i, "a", 10_000 * i) for i in range(12)]
     places = [Destination(f"c{j}", f"G{j}", j, "c") for j in range(3)]
     return joined(links, sources, places)
@@ -106,7 +120,8 @@ def two_ways() -> NetworkSpec:
     """
     ends = ["ab", "eb", "bc", "cd", "bf", "fd"]
     links = tuple(
-        Link(a, b, 2_000_000, 100_000 * i, 50, 0.02, None, 9) for i, (a, b) in enumerate(ends)
+        Link(a, b, 2_000_000, 100_000 * i, DropTail(50), Bernoulli(0.02), None, 9)
+        for i, (a, b) in enumerate(ends)
     )
     routes = (("a", "b", "c", "d"), ("e", "b", "f", "d"), ("b", "c", "d"))
     return NetworkSpec(
@@ -115,7 +130,7 @@ def two_ways() -> NetworkSpec:
         tuple(Source(f"p{i}", i, route[0]) for i, route in enumerate(routes)),
         (Destination("c0", "G0", 9, "d"),),
         tuple(Flow(i, 0, route) for i, route in enumerate(routes)),
-        (CrossFlow("back", "cbr", 400_000, 500, ("d", "f", "b", "a")),),
+        (CrossFlow("back", Cbr(400_000, 500), ("d", "f", "b", "a")),),
     )
 
 
@@ -134,8 +149,8 @@ def in_rounds(seed: int) -> Case:
             nodes[b],
             int(draw.choice([1_000_000, 2_000_000])),
             int(draw.integers(0, 4)) * TICK_NS,
-            int(draw.integers(1, 6)),
-            float(draw.choice([0.0, 0.1])),
+            DropTail(int(draw.integers(1, 6))),
+            Bernoulli(0.1) if draw.random() < 0.5 else None,
         )
         for a, b in sorted(ends)
     ]
@@ -143,21 +158,25 @@ def in_rounds(seed: int) -> Case:
     sources = [Source(f"p{i}", i, at[i], int(draw.integers(0, 4)) * TICK_NS) for i in range(4)]
     places = [Destination(f"c{j}", f"G{j}", j, at[4 + j]) for j in range(5)]
     places[0] = replace(places[0], jitter=UniformJitter(0, 1_000_000))
+    pairs = [draw.choice(len(nodes), 2, replace=False) for _ in range(3)]
+    payloads = np.array([34, 34 + 62])
     cross = [
-        CrossFlow(f"x{i}", "cbr", 1e5, 34, (nodes[a], nodes[b]))
-        for i, (a, b) in enumerate(draw.choice(len(nodes), 2, replace=False) for _ in range(3))
+        CrossFlow(
+            f"x{i}",
+            Trace(np.sort(draw.integers(0, 400, 300)) * TICK_NS, draw.choice(payloads, 300)),
+            (nodes[a], nodes[b]),
+        )
+        for i, (a, b) in enumerate(pairs)
     ]
-    traces = {flow.name: np.sort(draw.integers(0, 400, 300)) * TICK_NS for flow in cross}
     frames = [(k * 40 * TICK_NS, k) for k in range(8)]
     steps = np.sort(draw.integers(0, 10**8, 10)).tolist()
-    return Case(joined(links, sources, places, cross), seed, traces, frames, steps)
+    return Case(joined(links, sources, places, cross), seed, frames, steps)
 
 
 def wide_area(frames: int = 90, until_ns: int = 1_600_000_000) -> Case:
     """Return the 40-router network of `test_ns3_reference.py`."""
-    spec, traces = wide_area_network()
     plan = [(k * 10**9 // 60, k) for k in range(frames)]
-    return Case(spec, 1, traces, plan, until_ns=until_ns)
+    return Case(wide_area_network(), 1, plan, until_ns=until_ns)
 
 
 CASES: dict[str, Callable[[], Case]] = {

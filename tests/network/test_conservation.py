@@ -9,8 +9,12 @@ from network.builders import busy_ring, joined
 from tieline.errors import CosimError
 from tieline.network.engine import Counts
 from tieline.network.jitter import UniformJitter
+from tieline.network.losses import Bernoulli
 from tieline.network.packet import PacketEngine
+from tieline.network.packet.memory import FREE_PACKETS
+from tieline.network.queues import DropTail
 from tieline.network.spec import CrossFlow, Destination, Link, NetworkSpec, Source
+from tieline.network.traffic import Cbr, Poisson
 
 
 @st.composite
@@ -29,8 +33,8 @@ def networks(draw: st.DrawFn) -> NetworkSpec:
             names[b],
             draw(st.sampled_from([64_000, 500_000, 10_000_000])),
             draw(st.sampled_from([0, 1, 300_000, 5_000_000])),
-            draw(st.integers(1, 6)),
-            draw(st.sampled_from([0.0, 0.3])),
+            DropTail(draw(st.integers(1, 6))),
+            draw(st.sampled_from([None, Bernoulli(0.3)])),
             draw(st.sampled_from([None, UniformJitter(0, 2_000_000)])),
             draw(st.integers(0, 20)),
         )
@@ -42,11 +46,11 @@ def networks(draw: st.DrawFn) -> NetworkSpec:
         Destination(f"c{j}", f"G{j}", j, draw(place), 500_000 * j)
         for j in range(draw(st.integers(0, 3)))
     ]
-    kinds = st.sampled_from(["cbr", "poisson"])
+    kinds = st.sampled_from([Cbr, Poisson])
     rates = st.sampled_from([20_000.0, 900_000.0])
     plans = draw(st.lists(st.tuples(kinds, rates, place, place), max_size=2))
     cross = [
-        CrossFlow(f"cross flow {c}", kind, rate, 300, (a, b))
+        CrossFlow(f"cross flow {c}", kind(rate, 300), (a, b))
         for c, (kind, rate, a, b) in enumerate(plans)
         if a != b
     ]
@@ -98,7 +102,7 @@ def test_a_packet_that_disappears_inside_is_noticed():
     engine = PacketEngine(busy_ring(), seed=1)
     engine.send(0, np.arange(2), 0)
     engine.run_until(5_000_000)
-    engine._memory.control[2] += 1
+    engine._memory.control[FREE_PACKETS] += 1
     with pytest.raises(CosimError, match="lost count"):
         engine.run_until(5_000_001)
 
@@ -108,8 +112,8 @@ def test_an_overloaded_network_drops_and_does_not_grow():
 
     Cross traffic of a hundred times the link's rate, for 20 s.
     """
-    link = Link("a", "b", 1_000_000, 1_000_000, 50)
-    flood = CrossFlow("cross flow 0", "poisson", 100e6, 972, ("a", "b"))
+    link = Link("a", "b", 1_000_000, 1_000_000, DropTail(50))
+    flood = CrossFlow("cross flow 0", Poisson(100e6, 972), ("a", "b"))
     engine = PacketEngine(joined([link], [], [], [flood]), seed=1)
     cells = len(engine._memory.cells)
     engine.run_until(20_000_000_000)
@@ -121,7 +125,7 @@ def test_an_overloaded_network_drops_and_does_not_grow():
 
 def test_more_packets_than_the_first_room_are_carried():
     """Otherwise a fast, long link would lose packets for want of memory."""
-    link = Link("a", "b", 10**9, 2_000_000_000, 20_000)
+    link = Link("a", "b", 10**9, 2_000_000_000, DropTail(20_000))
     spec = joined([link], [Source("p", 1, "a")], [Destination("c", "G", 2, "b")])
     engine = PacketEngine(spec, seed=1)
     for k in range(12_000):

@@ -4,9 +4,14 @@ import numpy as np
 import pytest
 
 from network.builders import joined
+from tieline.network.empirical import EmpiricalDelay
+from tieline.network.engine import Engine
 from tieline.network.ideal import ConstantDelay
+from tieline.network.jitter import UniformJitter
 from tieline.network.packet import PacketEngine
-from tieline.network.spec import Destination, Link, NetworkSpec, Source
+from tieline.network.path_delays import DrawnDelay
+from tieline.network.queues import DropTail
+from tieline.network.spec import Destination, Link, NetworkSpec, Source, direct_spec
 
 SOURCES, DESTINATIONS = 3, 2
 RATE = 60
@@ -16,15 +21,34 @@ def packet_network_spec() -> NetworkSpec:
     """Return three PMUs and two controllers around one link, no two delays alike."""
     sources = [Source(f"p{i}", i, "a", 1_000_000 * i) for i in range(SOURCES)]
     destinations = [Destination(f"c{j}", f"G{j}", j, "b", 3_000 * j) for j in range(DESTINATIONS)]
-    return joined([Link("a", "b", 10**7, 2_000_000, 50)], sources, destinations)
+    return joined([Link("a", "b", 10**7, 2_000_000, DropTail(50))], sources, destinations)
 
 
+def empirical_network() -> Engine:
+    """Return paths whose packets take 1 to 40 ms, each as long as it happens to, in order."""
+    spec = direct_spec(SITES["sources"], SITES["destinations"], 1_000_000)
+    delay = DrawnDelay(UniformJitter(0, 39_000_000), 1_000_000)
+    return EmpiricalDelay(spec, [delay] * (SOURCES * DESTINATIONS), 0.0, True, 1)
+
+
+def helics_filters() -> Engine:
+    """Return HELICS's own delay filter."""
+    from tieline.network.helics_filters import HelicsFilters
+
+    return HelicsFilters(direct_spec(SITES["sources"], SITES["destinations"], 0), 30_000_000, 0.0)
+
+
+SITES = {
+    "sources": [{"name": f"p{i}", "bus": i} for i in range(SOURCES)],
+    "destinations": [{"name": f"c{j}", "unit": f"G{j}", "bus": j} for j in range(DESTINATIONS)],
+}
 ENGINES = {
     "ideal": lambda: ConstantDelay(DESTINATIONS, 0),
     "constant": lambda: ConstantDelay(DESTINATIONS, 250_000_000),
     "packet": lambda: PacketEngine(packet_network_spec(), 1),
+    "empirical": empirical_network,
+    "helics-filters": helics_filters,
 }
-
 PROMISES = (
     "test_every_frame_reaches_every_destination_once",
     "test_arrivals_lie_in_their_window_and_in_order",
@@ -33,11 +57,15 @@ PROMISES = (
 )
 """The tests that ns-3, which runs in a process of its own, has to pass as well."""
 
+MARKS = {"helics-filters": pytest.mark.helics}
 
-@pytest.fixture(params=ENGINES)
+
+@pytest.fixture(params=[pytest.param(name, marks=MARKS.get(name, ())) for name in ENGINES])
 def engine(request):
     """Each engine in turn."""
-    return ENGINES[request.param]()
+    made = ENGINES[request.param]()
+    yield made
+    made.close()
 
 
 def test_every_frame_reaches_every_destination_once(engine):

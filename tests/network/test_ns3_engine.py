@@ -4,6 +4,7 @@ import os
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -18,9 +19,12 @@ from tieline.network.ns3 import library, limits
 from tieline.network.ns3.addresses import addressed
 from tieline.network.ns3.build import rate_for_ns3
 from tieline.network.packet import PacketEngine
-from tieline.network.spec import service_ns
+from tieline.network.queues import EarlyDetection, RandomEarlyDetection
+from tieline.network.spec import CrossFlow, LinkCut, service_ns
+from tieline.network.traffic import Cbr, Greedy
 
 TESTS = Path(__file__).parents[1]
+RED = RandomEarlyDetection(10, EarlyDetection(3.0, 8.0, 0.1, 4))
 
 
 def with_ns3(test: Any) -> Any:
@@ -62,6 +66,7 @@ def test_every_packet_fares_as_in_the_packet_engine(
     found = by_ns3[0][name]
     assert found.counts == expected.counts
     assert found.links == expected.links
+    assert found.counters == expected.counters
     assert found.drops == expected.drops
     assert found.arrivals == expected.arrivals
     assert len(found.arrivals) > 0
@@ -138,8 +143,49 @@ def test_what_ns3_has_not_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) ->
         limits.check_carried(busy_ring())
     assert len(refused.value.findings) == 3
     assert refused.value.findings[0] == (
-        "network.engine ns3 has no jitter of a link, which a-b has: use network.engine packet"
+        "network.engine ns3 has no jitter of a link, and a-b has it: use network.engine packet"
     )
+
+
+@pytest.mark.parametrize(
+    ("changed", "text"),
+    [
+        ({"is_half_duplex": True}, "has no is_half_duplex of a link, and n0-n1 has it"),
+        ({"queue": RED}, "drop-tail queues alone, and link n0-n1 has a RandomEarlyDetection"),
+        ({"mtu_bytes": 500}, "those of big have 1028 bytes where the MTU is 500"),
+    ],
+)
+def test_a_link_that_ns3_has_not_is_refused(
+    changed: dict[str, Any], text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Otherwise the link would silently be another one."""
+    monkeypatch.setattr(limits, "check_installed", lambda: None)
+    spec = chain([(10**7, 0)])
+    big = CrossFlow("big", Cbr(10**6, 1000), ("n0", "n1"))
+    spec = replace(spec, cross_flows=(big,), links=(replace(spec.links[0], **changed),))
+    with pytest.raises(InputError, match=text):
+        limits.check_carried(spec)
+
+
+@pytest.mark.parametrize(
+    ("changed", "text"),
+    [
+        ({"transport": "multicast"}, "no transport of a network"),
+        ({"changes": (LinkCut(10**9, 0),)}, "no changes of a network"),
+        ({"taps": (0,)}, "no taps of a network"),
+        (
+            {"cross_flows": (CrossFlow("bulk", Greedy(1000, 64), ("n0", "n1")),)},
+            "no traffic that waits for answers, and bulk is Greedy",
+        ),
+    ],
+)
+def test_a_network_that_ns3_has_not_is_refused(
+    changed: dict[str, Any], text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Otherwise an event, or a transport, of the topology would silently not happen."""
+    monkeypatch.setattr(limits, "check_installed", lambda: None)
+    with pytest.raises(InputError, match=text):
+        limits.check_carried(replace(chain([(10**7, 0)]), **changed))
 
 
 def test_a_route_longer_than_the_time_to_live_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,7 +206,9 @@ def test_a_rate_is_chosen_at_which_ns3_rounds_as_the_specification_does() -> Non
     # 71 bytes take 4437.5 ns, and one bit a second less makes them 4437.500035 ns.
     assert service_ns(link, 34) == 4438
     assert rate_for_ns3(link, {34}, lambda rate, size: 4437 + (rate < 128_000_000)) == 127_999_999
-    with pytest.raises(InputError, match=r"cannot serialise packets of \[71\] bytes .*link n0-n1"):
+    with pytest.raises(
+        InputError, match=r"cannot serialise packets of 71 to 71 bytes .*link n0-n1"
+    ):
         rate_for_ns3(link, {34}, rounding_down)
 
 

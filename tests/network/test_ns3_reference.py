@@ -6,7 +6,9 @@ import numpy as np
 
 from network.builders import ALL, overhead_for
 from tieline.network.packet import PacketEngine
+from tieline.network.queues import DropTail
 from tieline.network.spec import CrossFlow, Destination, Flow, Link, NetworkSpec, Node, Source
+from tieline.network.traffic import Trace
 
 DATA = Path(__file__).parent / "data" / "wan_base_extract.npz"
 PMUS, CONTROLLERS = 30, 34
@@ -15,11 +17,11 @@ PMUS, CONTROLLERS = 30, 34
 OVERHEAD = overhead_for(76 + 28 + 2)
 
 
-def wide_area_network() -> tuple[NetworkSpec, dict[str, np.ndarray]]:
-    """Return the network of the extract and the instants at which its cross flows send."""
+def wide_area_network() -> NetworkSpec:
+    """Return the network of the extract."""
     data = np.load(DATA)
     links = tuple(
-        Link(f"n{a}", f"n{b}", rate, propagation, queue, overhead_bytes=OVERHEAD)
+        Link(f"n{a}", f"n{b}", rate, propagation, DropTail(queue), overhead_bytes=OVERHEAD)
         for a, b, rate, propagation, queue in data["links"].tolist()
     )
     ends = np.cumsum(data["route_lengths"].astype(int))[:-1]
@@ -37,14 +39,15 @@ def wide_area_network() -> tuple[NetworkSpec, dict[str, np.ndarray]]:
         Destination(f"c{j}", f"G{j}", j, routes[j][-1]) for j in range(CONTROLLERS)
     )
     payload = int(data["cross_payload_bytes"]) + 2 - OVERHEAD
-    cross = tuple(
-        CrossFlow(f"cross flow {c}", "poisson", 1e6, payload, route)
-        for c, route in enumerate(routes[PMUS * CONTROLLERS :])
-    )
     traces = np.split(data["trace_ns"], np.cumsum(data["trace_lengths"])[:-1])
+    cross = tuple(
+        CrossFlow(f"cross flow {c}", Trace(times_ns, np.full(len(times_ns), payload)), route)
+        for c, (times_ns, route) in enumerate(
+            zip(traces, routes[PMUS * CONTROLLERS :], strict=True)
+        )
+    )
     nodes = tuple(Node(name) for name in sorted({name for route in routes for name in route}))
-    spec = NetworkSpec(nodes, links, sources, destinations, flows, cross)
-    return spec, {flow.name: trace for flow, trace in zip(cross, traces, strict=True)}
+    return NetworkSpec(nodes, links, sources, destinations, flows, cross)
 
 
 def test_every_packet_takes_as_long_as_in_ns3():
@@ -54,8 +57,7 @@ def test_every_packet_takes_as_long_as_in_ns3():
     delay to the nanosecond and the same 219 drops. Frames after the 90th are sent, too, since they
     can still delay those before.
     """
-    spec, traces = wide_area_network()
-    engine = PacketEngine(spec, seed=1, traces=traces)
+    engine = PacketEngine(wide_area_network(), seed=1)
     for k in range(96):
         engine.send(k * 10**9 // 60, np.arange(PMUS), k)
     arrivals = engine.run_until(ALL).arrivals

@@ -6,7 +6,9 @@ import pytest
 from network.builders import ALL, chain, joined, overhead_for
 from tieline.errors import CosimError
 from tieline.network.engine import LOSS, QUEUE_FULL
+from tieline.network.losses import Bernoulli
 from tieline.network.packet import PacketEngine
+from tieline.network.queues import DropTail
 from tieline.network.spec import Destination, Link, Source, service_ns
 
 ONE = np.array([0])
@@ -63,7 +65,10 @@ def test_a_burst_leaves_back_to_back():
 )
 def test_serialisation_is_rounded_to_the_nearest_nanosecond(rate_bps, payload_bytes, delay_ns):
     """Otherwise delays would drift from ns-3's, whose figures these are (`analytic.json`, 6)."""
-    assert service_ns(Link("a", "b", rate_bps, 0, 1, overhead_bytes=2), payload_bytes) == delay_ns
+    assert (
+        service_ns(Link("a", "b", rate_bps, 0, DropTail(1), overhead_bytes=2), payload_bytes)
+        == delay_ns
+    )
 
 
 @pytest.mark.parametrize(
@@ -104,7 +109,7 @@ def test_packets_leave_a_port_in_the_order_in_which_they_came():
 
 def test_a_lost_packet_has_used_the_link():
     """Otherwise losses would make room for other packets, which they do not."""
-    spec = chain([(1_000_000, 1_000_000)], queue=1000, loss_probability=0.5)
+    spec = chain([(1_000_000, 1_000_000)], queue=1000, loss=Bernoulli(0.5))
     engine = PacketEngine(spec, seed=3)
     for k in range(200):
         engine.send(0, ONE, k)

@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 from network.builders import ALL, chain, joined, overhead_for
+from tieline.network.losses import Bernoulli
 from tieline.network.packet import PacketEngine
-from tieline.network.packet.draws import gaps, losses, trace_gaps
+from tieline.network.packet.draws import gaps
+from tieline.network.queues import DropTail
 from tieline.network.spec import CrossFlow, Link
+from tieline.network.traffic import Cbr, Poisson, Trace
 from tieline.streams import stream
 
 ONE = np.array([0])
@@ -41,9 +44,11 @@ def test_losses_are_bernoulli_with_the_given_probability():
     together with probability p^2.
     """
     count, p = 200_000, 0.05
-    chunks = losses(1, "loss of a->b", p)
-    lost = np.concatenate([next(chunks) for _ in range(count // 4096 + 1)])[:count]
-    assert set(np.unique(lost)) == {0, 1}
+    gaps_between = Bernoulli(p).gaps(stream(1, "loss of a->b"))
+    places = np.cumsum(np.concatenate([next(gaps_between) for _ in range(4)])) - 1
+    assert places[-1] > count
+    lost = np.zeros(count, dtype=int)
+    lost[places[places < count]] = 1
     assert abs(lost.sum() - count * p) < 4 * np.sqrt(count * p * (1 - p))
     pairs = np.sum(lost[1:] & lost[:-1])
     assert abs(pairs - count * p**2) < 4 * np.sqrt(count * p**2)
@@ -52,7 +57,7 @@ def test_losses_are_bernoulli_with_the_given_probability():
 def test_a_link_loses_the_stated_share():
     """Otherwise the loss that an experiment sets would not be the loss that it gets."""
     count, p = 20_000, 0.05
-    engine = PacketEngine(chain([(10**9, 0)], queue=100_000, loss_probability=p), seed=2)
+    engine = PacketEngine(chain([(10**9, 0)], queue=100_000, loss=Bernoulli(p)), seed=2)
     for k in range(count):
         engine.send(k * 1_000, ONE, k)
     drops = engine.run_until(ALL).drops
@@ -61,48 +66,55 @@ def test_a_link_loses_the_stated_share():
 
 def test_poisson_gaps_are_exponential():
     """Otherwise the queues that cross traffic forms would be those of another traffic."""
-    flow = CrossFlow("cross flow 0", "poisson", 1e6, 97, ("a", "b"))
+    flow = CrossFlow("cross flow 0", Poisson(1e6, 97), ("a", "b"))
     chunks = gaps(1, flow)
     drawn = np.concatenate([next(chunks) for _ in range(10)])
     n = len(drawn)
-    uniform = np.sort(1 - np.exp(-drawn / flow.gap_ns))
+    uniform = np.sort(1 - np.exp(-drawn / flow.traffic.gap_ns))
     distance = np.abs(uniform - (np.arange(n) + 0.5) / n).max()
     # Kolmogorov-Smirnov: sqrt(n) D exceeds 1.95 with probability 0.001.
     assert distance * np.sqrt(n) < 1.95
     # 125 bytes at 1 Mbit/s.
-    assert flow.gap_ns == 1_000_000
+    assert flow.traffic.gap_ns == 1_000_000
 
 
 def test_cbr_keeps_its_rate_to_the_packet():
     """Otherwise rounding would add up to another rate in a long run."""
-    flow = CrossFlow("cross flow 0", "cbr", 3e6, 972, ("a", "b"))
+    flow = CrossFlow("cross flow 0", Cbr(3e6, 972), ("a", "b"))
     chunks = gaps(1, flow)
     instants = np.cumsum(np.concatenate([next(chunks) for _ in range(5)]))
     phase_ns = instants[0]
-    assert 0 <= phase_ns <= flow.gap_ns
+    assert 0 <= phase_ns <= flow.traffic.gap_ns
     expected = phase_ns + np.arange(len(instants)) * (8e12 / 3e6)
     # Each instant, and the phase, is rounded to the nearest nanosecond.
     assert np.abs(instants - expected).max() <= 1
 
 
-@pytest.mark.parametrize("kind", ["cbr", "poisson"])
+@pytest.mark.parametrize("kind", [Cbr, Poisson])
 def test_cross_flows_carry_their_mean_rate(kind):
     """Otherwise a topology's cross traffic would be more or less than it says."""
-    flow = CrossFlow("cross flow 0", kind, 2e6, 222, ("a", "b"))
-    engine = PacketEngine(joined([Link("a", "b", 10**8, 0, 100)], [], [], [flow]), seed=4)
+    flow = CrossFlow("cross flow 0", kind(2e6, 222), ("a", "b"))
+    engine = PacketEngine(joined([Link("a", "b", 10**8, 0, DropTail(100))], [], [], [flow]), seed=4)
     engine.run_until(30_000_000_000)
     # 250 bytes at 2 Mbit/s: 1,000 packets a second; Poisson counts deviate by sqrt(n).
-    assert abs(engine.links()[0].packets - 30_000) < (2 if kind == "cbr" else 4 * np.sqrt(30_000))
+    assert abs(engine.links()[0].packets - 30_000) < (2 if kind is Cbr else 4 * np.sqrt(30_000))
 
 
 def test_a_trace_is_followed_and_then_silent():
     """Otherwise a recorded traffic could not be replayed."""
-    flow = CrossFlow("cross flow 0", "poisson", 1e6, 97, ("a", "b"))
-    spec = joined([Link("a", "b", 10**9, 0, 100)], [], [], [flow])
-    trace = np.array([5, 1_000, 7_000_000, 7_000_000], dtype=np.int64)
-    engine = PacketEngine(spec, seed=1, traces={flow.name: trace})
+    trace = Trace(np.array([5, 1_000, 7_000_000, 7_000_000]), np.array([97, 97, 50, 1_000]))
+    spec = joined(
+        [Link("a", "b", 10**9, 0, DropTail(100))],
+        [],
+        [],
+        [CrossFlow("cross flow 0", trace, ("a", "b"))],
+    )
+    engine = PacketEngine(spec, seed=1)
     engine.run_until(6_999_999)
     assert engine.links()[0].packets == 2
     engine.run_until(10**18)
-    assert engine.links()[0].packets == 4
-    assert next(trace_gaps(trace))[:4].tolist() == [5, 995, 6_999_000, 0]
+    # Each with 28 bytes of UDP and IPv4 headers.
+    assert (engine.links()[0].packets, engine.links()[0].bytes) == (
+        4,
+        97 + 97 + 50 + 1_000 + 4 * 28,
+    )

@@ -5,13 +5,14 @@ import random
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tieline.network.queues import DropTail
 from tieline.network.routing import routes_from
 from tieline.network.spec import Link
 
 
 def link(a: str, b: str, propagation_ns: int = 1_000, rate_bps: int = 10**9) -> Link:
     """Return a link that differs in what routing looks at."""
-    return Link(a, b, rate_bps, propagation_ns, 10)
+    return Link(a, b, rate_bps, propagation_ns, DropTail(10))
 
 
 def test_the_fastest_route_wins_over_the_one_of_fewer_links():

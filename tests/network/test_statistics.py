@@ -67,7 +67,16 @@ def test_a_constant_delay_has_exact_percentiles():
     """Otherwise the constant engine would be reported with a delay that nobody set."""
     statistics = statistics_of(np.full(100, LEAST_NS))
     assert statistics.percentiles_ns(0.5)[0] == statistics.percentiles_ns(0.95)[0] == LEAST_NS
-    assert statistics.jitter_ns()[0] == 0
+    assert statistics.jitter_ns()[0] == statistics.smoothed_jitter_ns()[0] == 0
+
+
+def test_the_jitter_of_rfc_3550_follows_its_recursion():
+    """Otherwise it could not be compared with what an RTP receiver reports."""
+    delays_ns = LEAST_NS + np.array([0, 1_600, 0, 800_000])
+    expected_ns = 0.0
+    for step_ns in np.abs(np.diff(delays_ns)):
+        expected_ns += (step_ns - expected_ns) / 16
+    assert statistics_of(delays_ns).smoothed_jitter_ns()[0] == expected_ns
 
 
 def test_the_histogram_of_all_flows_counts_every_delay():
@@ -90,18 +99,19 @@ def test_nothing_delivered_has_no_delay():
 def test_packets_are_counted_where_they_end():
     """Otherwise losses would be blamed on queues, or on other flows."""
     statistics = FlowStatistics(np.array([0] * 4), np.arange(4).reshape(2, 2))
-    statistics.add_sent(np.array([0, 1]))
+    statistics.add_sent(np.array([0, 1]), 0)
+    statistics.add_sent(np.array([1]), 1)
     drops = np.zeros(3, DROP)
     drops["source"] = [0, 1, 1]
     drops["destination"] = [1, 0, 0]
     drops["reason"] = [QUEUE_FULL, LOSS, LOSS]
-    statistics.sent[2] += 1
+    drops["sequence"] = [0, 0, 1]
     statistics.add(Outcome(arrivals_of(np.array([5])), drops), np.zeros(1, np.int64))
-    assert statistics.sent.tolist() == [1, 1, 2, 1]
+    assert statistics.sent.tolist() == [1, 1, 2, 2]
     assert statistics.dropped_queue.tolist() == [0, 1, 0, 0]
     assert statistics.dropped_loss.tolist() == [0, 0, 2, 0]
     assert statistics.delivered.tolist() == [1, 0, 0, 0]
-    assert statistics.in_flight.tolist() == [0, 0, 0, 1]
+    assert statistics.in_flight.tolist() == [0, 0, 0, 2]
 
 
 def test_the_nearest_rank_of_few_counts():

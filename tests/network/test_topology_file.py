@@ -6,6 +6,8 @@ import pytest
 
 from tieline.errors import InputError
 from tieline.network.jitter import GammaJitter, NormalJitter, UniformJitter
+from tieline.network.losses import Bernoulli
+from tieline.network.queues import DropTail
 from tieline.network.settings import NetworkSettings
 from tieline.network.spec import Link, NetworkSpec
 from tieline.network.topology import mean_unloaded_delay_ns, network_spec, read_topology
@@ -57,8 +59,16 @@ def test_a_file_says_what_the_network_is(tmp_path):
     """Otherwise an experiment would run on another network than the one written down."""
     spec = read(tmp_path)
     assert spec.links == (
-        Link("north", "middle", 10_000_000, 2_000_000, 50, overhead_bytes=9),
-        Link("south", "middle", 512_000, 250_000, 7, 0.01, GammaJitter(1_000_000, 2_000_000), 0),
+        Link("north", "middle", 10_000_000, 2_000_000, DropTail(50), overhead_bytes=9),
+        Link(
+            "south",
+            "middle",
+            512_000,
+            250_000,
+            DropTail(7),
+            Bernoulli(0.01),
+            GammaJitter(1_000_000, 2_000_000),
+        ),
     )
     assert [(node.name, node.buses, node.x) for node in spec.nodes] == [
         ("north", (1, 2), 0.0),
@@ -81,15 +91,15 @@ def test_a_file_says_what_the_network_is(tmp_path):
     ]
     (cross,) = spec.cross_flows
     # 250 bytes of payload, UDP and IPv4 at 100 kbit/s.
-    assert (cross.route, cross.gap_ns) == (("north", "middle", "south"), 20_000_000)
+    assert (cross.route, cross.traffic.gap_ns) == (("north", "middle", "south"), 20_000_000)
 
 
 def test_settings_override_the_file(tmp_path):
     """Otherwise a sweep over loss or load would repeat one experiment."""
     spec = read(tmp_path, loss=0.2, cross_traffic=2.0)
-    assert {link.loss_probability for link in spec.links} == {0.2}
-    assert spec.cross_flows[0].gap_ns == 10_000_000
-    assert read(tmp_path, loss=0.0).links[1].loss_probability == 0
+    assert {link.loss for link in spec.links} == {Bernoulli(0.2)}
+    assert spec.cross_flows[0].traffic.gap_ns == 10_000_000
+    assert read(tmp_path, loss=0.0).links[1].loss is None
     assert read(tmp_path, cross_traffic=0.0).cross_flows == ()
 
 
@@ -160,11 +170,12 @@ cross_traffic:
         "network.yaml:9: unknown node 'midle' (did you mean 'middle'?)",
         "network.yaml:10: links.1.queue must be greater than or equal to 1 (got 0)",
         "network.yaml:11: unknown key 'latency' "
-        "(allowed: rate, queue, loss, jitter, overhead, a, b, propagation)",
+        "(allowed: rate, queue, loss, jitter, overhead, framing, mpls_labels, duplex, mtu, cost, "
+        "a, b, propagation)",
         "network.yaml:12: links.3.rate must be greater than or equal to 1 (got '0 Mbit/s')",
         "network.yaml:12: links.3.loss must be less than 1 (got 1)",
         "network.yaml:13: links.4 lacks 'propagation'",
-        "network.yaml:15: cross_traffic.0.kind must be 'cbr' or 'poisson' (got 'poison')",
+        "network.yaml:15: unknown kind 'poison' (did you mean 'poisson'?)",
         "network.yaml:16: unknown node 'soth' (did you mean 'south'?)",
     ]
 
@@ -178,7 +189,11 @@ cross_traffic:
         ("loss: 0.01", "loss: -0.1", "15: links.1.loss must be greater than or equal to 0"),
         ("loss: 0.01", "loss: .nan", "15: links.1.loss must be a finite number (got nan)"),
         ("queue: 7", "queue: 7.5", "14: links.1.queue must be a valid integer (got 7.5)"),
-        ("gamma", "gama", "17: links.1.jitter must have a 'distribution' of uniform, normal"),
+        (
+            "gamma",
+            "gama",
+            "17: links.1.jitter must have a 'distribution' of constant, uniform, normal",
+        ),
         ("deviation: 2 ms", "deviation: 0", "17: links.1.jitter.deviation must be greater than"),
         ("deviation", "deviatio", "17: unknown key 'deviatio' (did you mean 'deviation'?)"),
         ("low: 1 ms", "low: 4 ms", "2: pmu.jitter 'low' must not exceed 'high'"),

@@ -102,7 +102,7 @@ class HelicsLink:
         while helics.helicsEndpointHasMessage(self._endpoint):
             message = helics.helicsEndpointGetMessage(self._endpoint)
             stamp_ns = seconds_to_ns(helics.helicsMessageGetTime(message))
-            messages.append((stamp_ns, _bytes_of(message)))
+            messages.append((stamp_ns, bytes_of(message)))
         return messages
 
     def fail(self, reason: str) -> None:
@@ -158,7 +158,8 @@ class Broker:
         return bool(helics.helicsBrokerWaitForDisconnect(self._broker, round(wait_s * 1e3)))
 
 
-def _bytes_of(message: Any) -> bytes:
+def bytes_of(message: Any) -> bytes:
+    """Return what a HELICS message carries."""
     # helicsMessageGetBytes has a C declaration parsed for each new length, 4 ms a message.
     size_bytes = helics.helicsMessageGetByteCount(message)
     start = helics.helicsMessageGetBytesPointer(message)

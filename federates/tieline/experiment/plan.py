@@ -70,7 +70,7 @@ def prepare(study: Study, survey: Survey = survey) -> Plan:
 
 def _planned(study: Study, point: Point, survey: Survey, known: dict[str, Sites]) -> PlannedRun:
     beside = study.sources.document.path.parent
-    experiment = _with_pss_file(point.experiment, beside)
+    experiment = _with_trace(_with_pss_file(point.experiment, beside), beside)
     folder = _case_folder(experiment.case, beside)
     topology = _topology(experiment, folder, beside)
     parts = experiment.model_dump(mode="json", include={"grid", "wams", "network"})
@@ -83,7 +83,11 @@ def _planned(study: Study, point: Point, survey: Survey, known: dict[str, Sites]
         inputs["topology"] = hashlib.sha256(topology.read_bytes()).hexdigest()
     if experiment.grid.pss.file is not None:
         inputs["pss"] = hashlib.sha256(Path(experiment.grid.pss.file).read_bytes()).hexdigest()
+    if experiment.network.empirical is not None and experiment.network.empirical.trace is not None:
+        trace = Path(experiment.network.empirical.trace)
+        inputs["trace"] = hashlib.sha256(trace.read_bytes()).hexdigest()
     run = _run_file(point, sites, folder, topology) | {"grid": parts["grid"]}
+    run["network"]["empirical"] = parts["network"]["empirical"]
     return PlannedRun(point, run, inputs)
 
 
@@ -130,6 +134,26 @@ def _with_pss_file(experiment: Experiment, beside: Path) -> Experiment:
     raise InputError(f"grid.pss.file {name!r} is missing: no file {beside / name}")
 
 
+def _with_trace(experiment: Experiment, beside: Path) -> Experiment:
+    """Return the experiment with its file of measured delays as an absolute path.
+
+    Raises:
+        InputError: there is no such file beside the experiment's file or here.
+    """
+    empirical = experiment.network.empirical
+    if empirical is None or empirical.trace is None:
+        return experiment
+    for path in (beside / empirical.trace, Path(empirical.trace)):
+        if path.is_file():
+            found = empirical.model_copy(update={"trace": str(path.resolve())})
+            network = experiment.network.model_copy(update={"empirical": found})
+            return experiment.model_copy(update={"network": network})
+    raise InputError(
+        f"network.empirical.trace {empirical.trace!r} is missing: no file"
+        f" {beside / empirical.trace}"
+    )
+
+
 def _case_folder(name: str, beside: Path) -> Path:
     """Return the case's folder; a path counts from the experiment's file, or else from here."""
     local = beside / name
@@ -142,18 +166,25 @@ def _case_folder(name: str, beside: Path) -> Path:
         raise InputError(f"case: {error}{near(name, known)}") from error
 
 
+_NOT_BY_NAME = ("case", "network")
+"""Files of a case that are no further topology."""
+
+
 def _topology(experiment: Experiment, folder: Path, beside: Path) -> Path | None:
     if experiment.network.engine not in PACKET_ENGINES:
         return None
     name = experiment.network.topology
-    places = [folder / "network.yaml"] if name == "case" else [beside / name, Path(name)]
-    for path in places:
+    places = [beside / name, Path(name), folder / f"{name}.yaml", folder / name]
+    for path in [folder / "network.yaml"] if name == "case" else places:
         if path.is_file():
             return path.resolve()
-    raise InputError(
-        f"network.topology {'of the case' if name == 'case' else repr(name)} is missing:"
-        f" no file {places[0]}"
-    )
+    if name == "case":
+        raise InputError(
+            f"network.topology of the case is missing: no file {folder / 'network.yaml'}"
+        )
+    own = sorted(path.stem for path in folder.glob("*.yaml") if path.stem not in _NOT_BY_NAME)
+    known = f" (the case has: {', '.join(['case', *own])}{near(name, own)})"
+    raise InputError(f"network.topology {name!r} is missing: no file {places[0]}{known}")
 
 
 def _folder_hash(folder: Path) -> str:

@@ -57,9 +57,10 @@ def without_effect(experiment: Experiment) -> list[Problem]:
     """Return the network settings that are given but that the chosen engine does not read."""
     network = experiment.network
     readers = {
-        "delay": ("constant",),
+        "delay": ("constant", "helics-filters"),
         "mean_delay": PACKET_ENGINES,
-        "loss": PACKET_ENGINES,
+        "loss": (*PACKET_ENGINES, "empirical", "helics-filters"),
+        "empirical": ("empirical",),
     }
     return [
         Problem(
@@ -118,17 +119,29 @@ def _average(experiment: Experiment) -> Iterator[Problem]:
 
 def _engine(experiment: Experiment) -> Iterator[Problem]:
     network = experiment.network
-    if experiment.wams.reporting == "continuous" and network.engine in PACKET_ENGINES:
+    if experiment.wams.reporting == "continuous" and network.engine not in ("ideal", "constant"):
         yield Problem(
             (("wams", "reporting"), ("network", "engine")),
             "wams.reporting 'continuous' sends no frames, so it needs network.engine ideal or"
             f" constant (got {network.engine}); give frames a second, such as 60, for"
             f" {network.engine}",
         )
-    if network.engine == "constant" and network.delay is None:
+    if network.engine in ("constant", "helics-filters") and network.delay is None:
         yield Problem(
             (("network", "engine"), ("network", "delay")),
-            "network.engine constant needs network.delay, such as 250 ms (got none)",
+            f"network.engine {network.engine} needs network.delay, such as 250 ms (got none)",
+        )
+    if network.engine == "helics-filters" and network.delay == 0:
+        yield Problem(
+            (("network", "delay"), ("network", "engine")),
+            "network.delay must be above 0 s with network.engine helics-filters (got 0 s;"
+            " network.engine ideal has no delay)",
+        )
+    if network.engine == "empirical" and network.empirical is None:
+        yield Problem(
+            (("network", "engine"), ("network", "empirical")),
+            "network.engine empirical needs network.empirical, such as {trace: delays.csv} (got"
+            " none)",
         )
 
 

@@ -138,9 +138,9 @@ def _quantile(counts: pd.DataFrame, share: float) -> float | None:
 
 
 def _packets(flows: pd.DataFrame) -> dict[str, Any]:
-    names = ("sent", "delivered", "dropped_queue", "dropped_loss", "in_flight")
+    names = ("sent", "delivered", "dropped_queue", "dropped_loss", "dropped_down", "in_flight")
     totals = {name: int(flows[name].sum()) if name in flows else 0 for name in names}
-    lost = totals["dropped_queue"] + totals["dropped_loss"]
+    lost = totals["dropped_queue"] + totals["dropped_loss"] + totals["dropped_down"]
     # Packets still under way at the end are neither lost nor delivered.
     ended = lost + totals["delivered"]
     return totals | {"loss": lost / ended if ended else 0.0}

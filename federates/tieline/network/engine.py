@@ -1,5 +1,6 @@
 """What every network engine does: takes frames at instants, gives deliveries and drops in order."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -22,13 +23,29 @@ DROP = np.dtype(
         ("reason", "u1"),
     ]
 )
-"""A packet that ended at `dropped_ns`; `reason` is `QUEUE_FULL` or `LOSS`."""
+"""A packet that ended at `dropped_ns`; `reason` is `QUEUE_FULL`, `LOSS` or `LINK_DOWN`."""
 
-DELIVERED, QUEUE_FULL, LOSS = 0, 1, 2
-"""How a packet ends: at its controller, at a full queue, or corrupted on a link."""
+LINK_COUNTER = np.dtype(
+    [
+        ("packets", "<i8"),
+        ("bytes", "<i8"),
+        ("busy_ns", "<i8"),
+        ("dropped_queue", "<i8"),
+        ("dropped_loss", "<i8"),
+        ("dropped_down", "<i8"),
+        ("queue", "<i8"),
+        ("max_queue", "<i8"),
+    ]
+)
+"""What one direction of one link has carried since the start, as `LinkUse`; `queue` is the packets
+that wait now, and `max_queue` the most that waited since the counters were last read."""
+
+DELIVERED, QUEUE_FULL, LOSS, LINK_DOWN = 0, 1, 2, 3
+"""How a packet ends: at its controller, at a queue, corrupted on a link, or with its link."""
 
 NO_ARRIVALS = np.empty(0, ARRIVAL)
 NO_DROPS = np.empty(0, DROP)
+NO_LINKS = np.empty(0, LINK_COUNTER)
 
 
 @dataclass(frozen=True)
@@ -44,6 +61,16 @@ class Outcome:
     drops: NDArray[np.void]
 
 
+def joined(outcomes: Sequence[Outcome]) -> Outcome:
+    """Return the outcomes of spans that follow one another as one; at least one is given."""
+    if len(outcomes) == 1:
+        return outcomes[0]
+    return Outcome(
+        np.concatenate([outcome.arrivals for outcome in outcomes]),
+        np.concatenate([outcome.drops for outcome in outcomes]),
+    )
+
+
 @dataclass(frozen=True)
 class Counts:
     """Packets of all flows since the start; `in_flight` is counted on its own, not inferred."""
@@ -53,15 +80,17 @@ class Counts:
     dropped_queue: int
     dropped_loss: int
     in_flight: int
+    dropped_down: int = 0
 
     def check(self, at_ns: int) -> None:
         """Raise CosimError unless every packet sent is accounted for."""
-        ended = self.delivered + self.dropped_queue + self.dropped_loss
+        ended = self.delivered + self.dropped_queue + self.dropped_loss + self.dropped_down
         if self.sent != ended + self.in_flight:
             raise CosimError(
                 f"the network lost count of packets at {at_ns} ns: {self.sent} sent, but "
                 f"{self.delivered} delivered, {self.dropped_queue} dropped at queues, "
-                f"{self.dropped_loss} lost on links and {self.in_flight} in flight"
+                f"{self.dropped_loss} lost on links, {self.dropped_down} lost with links and "
+                f"{self.in_flight} in flight"
             )
 
 
@@ -73,10 +102,11 @@ class LinkUse:
         origin, target: the nodes.
         rate_bps: its rate.
         packets, bytes: put on the link, those lost on it included, link-layer bytes included.
-        dropped_queue: packets that found the queue full.
+        dropped_queue: packets that found the queue full, or were dropped early.
         dropped_loss: packets that used the link and were lost at its end.
         busy_ns: time in transmission.
         max_queue: the most packets that waited, besides the one in transmission.
+        dropped_down: packets that were lost with the link, or came while it was down.
     """
 
     origin: str
@@ -88,6 +118,7 @@ class LinkUse:
     dropped_loss: int
     busy_ns: int
     max_queue: int
+    dropped_down: int = 0
 
 
 class Engine(Protocol):
@@ -118,7 +149,7 @@ class Engine(Protocol):
             sources: their numbers, ascending.
             sequence: the number of the frame; each source sends each number once.
             payloads: (sources, size) the bytes of the frames. An engine that carries bytes compares
-                what arrives with them, so that the frames handed over are those that were sent;
+                what arrives with them, so that the frames handed over are those that travelled;
                 the others leave them alone.
         """
 
@@ -135,8 +166,14 @@ class Engine(Protocol):
     def links(self) -> list[LinkUse]:
         """Return what each link carried, direction by direction; none without a topology."""
 
+    def link_counters(self) -> NDArray[np.void]:
+        """Return (directions,) of `LINK_COUNTER` in the order of `links`, at the last `run_until`.
+
+        Reading them begins a new span for `max_queue`; nothing else changes.
+        """
+
     def close(self) -> None:
-        """Let go of what it holds outside Python; no other method may be called after."""
+        """Let go of what the engine holds outside Python; nothing is asked of it afterwards."""
 
 
 def check_not_late(enters_ns: int, now_ns: int) -> None:

@@ -8,16 +8,15 @@ from numpy.typing import NDArray
 
 from tieline.cosim.interfaces import DELIVERY, NETWORK, Clock, DeliveryBundle, FrameBundle
 from tieline.errors import CosimError, TimeContractBroken
-from tieline.network.engine import Engine, Outcome
-from tieline.network.ideal import ConstantDelay
+from tieline.network.engine import Engine, Outcome, joined
+from tieline.network.linkless import open_without_links
 from tieline.network.ns3 import Ns3Engine
 from tieline.network.packet import PacketEngine
-from tieline.network.results import PacketLog, write_delays, write_flows, write_links
+from tieline.network.recorder import Recorder
 from tieline.network.settings import PACKET_ENGINES, NetworkSettings
-from tieline.network.spec import FRAME_BYTES, NetworkSpec, least_delay_ns
-from tieline.network.stats import FlowStatistics
+from tieline.network.spec import FRAME_BYTES, NetworkSpec
 from tieline.network.topology import network_spec
-from tieline.units import NS_PER_S
+from tieline.units import seconds_to_ns
 
 
 def open_participant(run: dict[str, Any], folder: Path) -> "NetworkParticipant":
@@ -29,18 +28,21 @@ def open_participant(run: dict[str, Any], folder: Path) -> "NetworkParticipant":
     """
     stated = run["network"]
     settings = NetworkSettings.model_validate({**stated, "topology": stated["topology"] or "case"})
+    sites = (run["sources"], run["destinations"])
     topology = Path(settings.topology) if settings.engine in PACKET_ENGINES else None
-    spec = network_spec(settings, topology, run["sources"], run["destinations"])
-    engine = _engine(settings, spec, run["seed"])
-    return NetworkParticipant(Clock(**run["clock"]), spec, engine, folder, settings.record_packets)
-
-
-def _engine(settings: NetworkSettings, spec: NetworkSpec, seed: int) -> Engine:
+    spec = network_spec(settings, topology, *sites)
+    engine: Engine
     if settings.engine == "packet":
-        return PacketEngine(spec, seed)
-    if settings.engine == "ns3":
-        return Ns3Engine(spec, seed)
-    return ConstantDelay(len(spec.destinations), spec.lookahead_ns)
+        engine = PacketEngine(spec, run["seed"])
+    elif settings.engine == "ns3":
+        engine = Ns3Engine(spec, run["seed"])
+    else:
+        engine = open_without_links(settings, spec, *sites, run["seed"])
+    clock = Clock(**run["clock"])
+    window_s = settings.series_window
+    window_ns = None if window_s is None else seconds_to_ns(window_s)
+    recorder = Recorder(folder, spec, engine, clock.rate_hz, window_ns, settings.record_packets)
+    return NetworkParticipant(clock, spec, engine, recorder)
 
 
 class NetworkParticipant:
@@ -50,25 +52,17 @@ class NetworkParticipant:
         clock: the instants at which frames are measured.
         spec: sources, destinations and flows.
         engine: what carries the packets.
-        folder: where the results go.
-        record_packets: whether packets.parquet is written.
+        recorder: keeps the statistics of what became of them.
     """
 
     name = NETWORK
 
-    def __init__(
-        self, clock: Clock, spec: NetworkSpec, engine: Engine, folder: Path, record_packets: bool
-    ) -> None:
+    def __init__(self, clock: Clock, spec: NetworkSpec, engine: Engine, recorder: Recorder) -> None:
         self._clock = clock
         self._spec = spec
         self._engine = engine
-        self._folder = folder
-        flow_of = np.arange(len(spec.flows)).reshape(len(spec.sources), len(spec.destinations))
-        least_ns = [least_delay_ns(spec, flow) for flow in spec.flows]
-        self._statistics = FlowStatistics(np.array(least_ns, dtype=np.int64), flow_of)
-        self._log = PacketLog(folder / "packets.parquet", flow_of) if record_packets else None
+        self._recorder = recorder
         self._frames = _FrameStore(len(spec.destinations))
-        self._until_ns = 0
 
     def start(self) -> list[bytes]:
         """Return the deliveries of the first intervals, in which no frame can matter."""
@@ -88,27 +82,30 @@ class NetworkParticipant:
         sources = np.arange(len(bundle.payloads))
         if len(sources):
             self._engine.send(bundle.measured_ns, sources, k, bundle.payloads)
-            self._statistics.add_sent(sources)
+            self._recorder.add_sent(sources, k)
             self._frames.keep(k, bundle.payloads)
         return self._carry(k + self._clock.lead)
 
     def finish(self) -> None:
-        """Write the tables and close the engine."""
-        self._write()
+        """Write the tables."""
+        self._recorder.write()
         self._engine.close()
 
     def abort(self, reason: str) -> None:
         """Write the tables as far as the run came."""
-        self._write()
+        self._recorder.write()
+        self._engine.close()
 
     def _carry(self, k: int) -> bytes:
         """Run the network over [t_k, t_k+1] and return its deliveries; nothing after the end."""
         if k >= self._clock.intervals:
             return b""
-        self._until_ns = self._clock.at_ns(k + 1)
-        outcome = self._engine.run_until(self._until_ns)
-        self._record(outcome)
-        return self._bundle(outcome).to_bytes()
+        until_ns = self._clock.at_ns(k + 1)
+        outcomes = []
+        for stop_ns in self._recorder.stops(until_ns):
+            outcomes.append(self._engine.run_until(stop_ns))
+            self._recorder.add(outcomes[-1], stop_ns)
+        return self._bundle(joined(outcomes), until_ns).to_bytes()
 
     def _check(self, k: int, bundle: FrameBundle) -> None:
         expected_ns = self._clock.at_ns(k)
@@ -124,29 +121,13 @@ class NetworkParticipant:
                 f"(got {count} of {size})"
             )
 
-    def _record(self, outcome: Outcome) -> None:
-        measured_ns = self._measured_ns(outcome.arrivals)
-        self._statistics.add(outcome, measured_ns)
-        if self._log is not None:
-            self._log.add(outcome, measured_ns, self._measured_ns(outcome.drops))
-
-    def _measured_ns(self, records: NDArray[np.void]) -> NDArray[np.int64]:
-        return records["sequence"].astype(np.int64) * NS_PER_S // self._clock.rate_hz
-
-    def _bundle(self, outcome: Outcome) -> DeliveryBundle:
+    def _bundle(self, outcome: Outcome, until_ns: int) -> DeliveryBundle:
         payloads, rows = self._frames.take(outcome)
         records = np.empty(len(outcome.arrivals), DELIVERY)
         for field in outcome.arrivals.dtype.names or ():
             records[field] = outcome.arrivals[field]
         records["payload"] = rows
-        return DeliveryBundle(self._until_ns, records, payloads)
-
-    def _write(self) -> None:
-        write_flows(self._folder / "flows.parquet", self._spec, self._statistics)
-        write_links(self._folder / "links.parquet", self._engine.links(), self._until_ns)
-        write_delays(self._folder / "delays.parquet", self._statistics)
-        if self._log is not None:
-            self._log.close()
+        return DeliveryBundle(until_ns, records, payloads)
 
 
 class _FrameStore:

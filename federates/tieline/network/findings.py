@@ -1,35 +1,51 @@
 """Gathers what is wrong with a topology file, each with its line and the nearest valid word."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from tieline.errors import InputError
-from tieline.network.schema import JITTERS, Entry, allowed_keys
+from tieline.network.entry import Entry
+from tieline.network.schema import TAGGED, allowed_keys
 from tieline.yaml_lines import Document, Position
 
 AnEntry = TypeVar("AnEntry", bound=Entry)
 
 
 class Findings:
-    """The findings of one document."""
+    """The findings of one document, or of what an experiment adds to it.
 
-    def __init__(self, document: Document) -> None:
+    Args:
+        document: the file.
+        prefix: put before every name, in place of file and line, where there is no file.
+    """
+
+    def __init__(self, document: Document, prefix: str = "") -> None:
         self.document = document
+        self._prefix = prefix
         self.found: list[tuple[int, str]] = []
 
     def add(self, position: Position, sentence: str) -> None:
         """Note what is wrong at a position."""
         self.found.append((self.document.line(position), sentence))
 
+    def lines(self) -> list[str]:
+        """Return all findings in the order of lines, each once."""
+        ordered = sorted(self.found, key=lambda finding: finding[0])
+        path = self.document.path
+        return list(
+            dict.fromkeys(
+                f"{self._prefix}{text}" if self._prefix else f"{path}:{line}: {text}"
+                for line, text in ordered
+            )
+        )
+
     def refuse(self) -> None:
-        """Raise InputError with all findings in the order of lines, if there are any."""
+        """Raise InputError with all findings, if there are any."""
         if self.found:
-            ordered = sorted(self.found, key=lambda finding: finding[0])
-            lines = (f"{self.document.path}:{line}: {text}" for line, text in ordered)
-            raise InputError(dict.fromkeys(lines))
+            raise InputError(self.lines())
 
     def section(self, value: Any, position: Position, kind: type) -> Any:
         """Return a value that must be a list or a mapping, or an empty one and a finding."""
@@ -61,12 +77,30 @@ class Findings:
 
     def entry(self, value: Any, position: Position, model: type[AnEntry]) -> AnEntry | None:
         """Return a checked entry, or none and the findings."""
+        folder = self.document.path.parent
         try:
-            return model.model_validate(value)
+            return model.model_validate(value, context={"folder": folder})
         except ValidationError as error:
             for detail in error.errors(include_url=False):
                 self._detail(detail, position, model)
             return None
+
+    def tagged(
+        self, value: Any, position: Position, tag: str, models: Mapping[str, type[Entry]]
+    ) -> Entry | None:
+        """Return a checked entry of the kind that its tag says, or none and the findings."""
+        name = ".".join(str(part) for part in position)
+        if not isinstance(value, dict):
+            self.add(position, f"{name} must hold keys and values (got {_shown(value)})")
+        elif tag not in value:
+            self.add(position, f"{name} lacks '{tag}' (allowed: {', '.join(models)})")
+        elif value[tag] not in models:
+            given = value[tag]
+            text = f"unknown {tag} '{given}'{nearest(given, models)}"
+            self.add((*position, tag), text)
+        else:
+            return self.entry(value, position, models[value[tag]])
+        return None
 
     def _detail(self, detail: Any, position: Position, model: type[Entry]) -> None:
         inner = self._existing(position, detail["loc"])
@@ -101,19 +135,23 @@ def nearest(given: Any, allowed: Collection[str]) -> str:
     matches = get_close_matches(str(given), allowed, n=1)
     if matches:
         return f" (did you mean '{matches[0]}'?)"
-    return f" (allowed: {', '.join(allowed)})" if len(allowed) <= 12 else ""
+    return f" (allowed: {', '.join(allowed)})" if len(allowed) <= 16 else ""
 
 
 def _model_at(location: tuple[Any, ...], model: type[Entry]) -> type[Entry]:
-    """Return the model that refused a key: a jitter's if the location passes one, else `model`."""
-    inside = [part for part in location[:-1] if part in JITTERS]
-    return JITTERS[inside[-1]] if inside else model
+    """Return the model that refused a key: the kind of entry last passed, or `model`."""
+    for part in reversed(location[:-1]):
+        for kinds in TAGGED.values():
+            if part in kinds:
+                return kinds[part]
+    return model
 
 
 def _reason(detail: Any) -> str:
     """Return what pydantic found as the continuation of `name ...`."""
     if detail["type"].startswith("union_tag"):
-        return f"must have a 'distribution' of {', '.join(JITTERS)}"
+        tag = detail["ctx"]["discriminator"].strip("'")
+        return f"must have a '{tag}' of {', '.join(TAGGED[tag])}"
     if detail["type"] in ("model_type", "model_attributes_type"):
         return "must hold keys and values"
     message = detail["msg"].removeprefix("Value error, ").replace("Input should be", "must be")

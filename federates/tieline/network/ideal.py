@@ -9,6 +9,7 @@ from tieline.network.engine import (
     ARRIVAL,
     NO_ARRIVALS,
     NO_DROPS,
+    NO_LINKS,
     Counts,
     LinkUse,
     Outcome,
@@ -41,7 +42,7 @@ class ConstantDelay:
         sequence: int,
         payloads: NDArray[np.uint8] | None = None,
     ) -> None:
-        """Take the frames of one instant; it carries no bytes.
+        """Take the frames of one instant; their bytes stay here.
 
         Raises:
             CosimError: the last `run_until` has passed the instant at which they arrive.
@@ -80,5 +81,9 @@ class ConstantDelay:
         """Return nothing: there are no links."""
         return []
 
+    def link_counters(self) -> NDArray[np.void]:
+        """Return nothing: there are no links."""
+        return NO_LINKS
+
     def close(self) -> None:
-        """Do nothing: it holds nothing outside Python."""
+        """Do nothing: there is nothing to let go of."""

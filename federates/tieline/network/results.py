@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tieline.network.age import NEVER, AgeOfInformation
 from tieline.network.engine import DELIVERED, LinkUse, Outcome
 from tieline.network.spec import NetworkSpec
 from tieline.network.stats import DELAY_BIN_NS, DELAY_BINS, FlowStatistics
@@ -25,14 +26,38 @@ FLOW_COLUMNS = (
     Column("delivered", "", "packets that the controller could use by the end", "int64"),
     Column("dropped_queue", "", "packets dropped at a full queue", "int64"),
     Column("dropped_loss", "", "packets lost on a link", "int64"),
+    Column("dropped_down", "", "packets lost with a link that went down, or was", "int64"),
     Column("in_flight", "", "packets under way at the end", "int64"),
     Column("delay_mean_s", "s", "mean combined delay, measurement to use by the controller"),
     Column("delay_min_s", "s", "least combined delay"),
     Column("delay_p50_s", "s", f"median combined delay, {_PERCENTILE}"),
     Column("delay_p95_s", "s", f"95th percentile of the combined delay, {_PERCENTILE}"),
     Column("delay_max_s", "s", "longest combined delay"),
-    Column("jitter_s", "s", "mean absolute difference of the delays of consecutive arrivals"),
+    Column("jitter_s", "s", "mean absolute delay variation of consecutive packets (RFC 3393)"),
     Column("loss", "", "dropped packets as a share of those delivered or dropped"),
+    Column("jitter_smoothed_s", "s", "interarrival jitter of RFC 3550 after the last arrival"),
+    Column("pdv_p95_s", "s", f"95th percentile of the delay beyond the least one, {_PERCENTILE}"),
+    Column("pdv_p999_s", "s", f"the same, 99.9th percentile (RFC 5481), {_PERCENTILE}"),
+    Column("loss_periods", "", "runs of consecutive lost packets (RFC 3357)", "int64"),
+    Column("loss_period_mean", "", "mean length of these runs, packets"),
+    Column("loss_period_max", "", "length of the longest one, packets", "int64"),
+    Column("loss_distance_mean", "", "mean step in number from a lost packet to the next lost one"),
+    Column("reordered", "", "packets that arrived after a later one (RFC 4737)", "int64"),
+    Column("reordered_share", "", "reordered packets as a share of those delivered"),
+    Column("extent_mean", "", "mean reordering extent of the reordered packets, packets"),
+    Column("extent_max", "", "longest reordering extent, packets", "int64"),
+    Column("age_mean_s", "s", "age of the freshest frame held, mean over time from the first on"),
+    Column("age_peak_s", "s", "age just before a fresher frame arrives, mean of these peaks"),
+    Column("age_max_s", "s", "greatest age"),
+)
+
+AGE_COLUMNS = (
+    Column("controller", "", "controller", "str"),
+    Column("unit", "", "unit of the controller", "str"),
+    Column("pmus", "", "PMUs of which it got a frame", "int64"),
+    Column("age_mean_s", "s", "mean age over time, mean of the PMUs"),
+    Column("age_peak_s", "s", "mean peak age, mean of the PMUs"),
+    Column("age_max_s", "s", "greatest age, of the PMU and at the instant where it is greatest"),
 )
 
 LINK_COLUMNS = (
@@ -43,6 +68,7 @@ LINK_COLUMNS = (
     Column("bytes", "", "bytes put on the link, link-layer bytes included", "int64"),
     Column("dropped_queue", "", "packets that found the queue full", "int64"),
     Column("dropped_loss", "", "packets lost on the link", "int64"),
+    Column("dropped_down", "", "packets lost when the link went down, or while it was", "int64"),
     Column("utilisation", "", "share of the time in transmission"),
     Column("max_queue", "", "most packets waiting besides the one in transmission", "int64"),
 )
@@ -58,16 +84,20 @@ PACKET_COLUMNS = (
     Column("sequence", "", "number of the frame", "int64"),
     Column("measured_ns", "ns", "instant of measurement", "int64"),
     Column("ended_ns", "ns", "when the controller could use it, or when it was dropped", "int64"),
-    Column("outcome", "", "0 delivered, 1 dropped at a full queue, 2 lost on a link", "uint8"),
+    Column("outcome", "", "0 delivered, 1 dropped at queue, 2 lost on link, 3 link down", "uint8"),
 )
 
 
-def write_flows(path: Path, spec: NetworkSpec, statistics: FlowStatistics) -> None:
+def write_flows(
+    path: Path, spec: NetworkSpec, statistics: FlowStatistics, age: AgeOfInformation, end_ns: int
+) -> None:
     """Write flows.parquet: one row a PMU flow."""
     sources = [spec.sources[flow.source] for flow in spec.flows]
     destinations = [spec.destinations[flow.destination] for flow in spec.flows]
-    dropped = statistics.dropped_queue + statistics.dropped_loss
+    dropped = statistics.dropped_queue + statistics.dropped_loss + statistics.dropped_down
     ended = statistics.delivered + dropped
+    order = statistics.order()
+    least_ns = statistics.min_ns()
     write_table(
         path,
         FLOW_COLUMNS,
@@ -82,14 +112,51 @@ def write_flows(path: Path, spec: NetworkSpec, statistics: FlowStatistics) -> No
             "delivered": statistics.delivered,
             "dropped_queue": statistics.dropped_queue,
             "dropped_loss": statistics.dropped_loss,
+            "dropped_down": statistics.dropped_down,
             "in_flight": statistics.in_flight,
             "delay_mean_s": statistics.mean_ns() / NS_PER_S,
-            "delay_min_s": statistics.min_ns() / NS_PER_S,
+            "delay_min_s": least_ns / NS_PER_S,
             "delay_p50_s": statistics.percentiles_ns(0.5) / NS_PER_S,
             "delay_p95_s": statistics.percentiles_ns(0.95) / NS_PER_S,
             "delay_max_s": statistics.max_ns() / NS_PER_S,
-            "jitter_s": statistics.jitter_ns() / NS_PER_S,
+            "jitter_s": order.variation_ns / NS_PER_S,
             "loss": np.where(ended > 0, dropped / np.maximum(ended, 1), np.nan),
+            "jitter_smoothed_s": statistics.smoothed_jitter_ns() / NS_PER_S,
+            "pdv_p95_s": (statistics.percentiles_ns(0.95) - least_ns) / NS_PER_S,
+            "pdv_p999_s": (statistics.percentiles_ns(0.999) - least_ns) / NS_PER_S,
+            "loss_periods": order.loss_periods,
+            "loss_period_mean": order.loss_period_mean,
+            "loss_period_max": order.loss_period_max,
+            "loss_distance_mean": order.loss_distance_mean,
+            "reordered": order.reordered,
+            "reordered_share": order.reordered_share,
+            "extent_mean": order.extent_mean,
+            "extent_max": order.extent_max,
+            "age_mean_s": age.mean_ns(end_ns) / NS_PER_S,
+            "age_peak_s": age.peak_mean_ns() / NS_PER_S,
+            "age_max_s": age.max_ns(end_ns) / NS_PER_S,
+        },
+    )
+
+
+def write_ages(
+    path: Path,
+    spec: NetworkSpec,
+    flow_of: NDArray[np.int64],
+    age: AgeOfInformation,
+    end_ns: int,
+) -> None:
+    """Write ages.parquet: one row a controller."""
+    write_table(
+        path,
+        AGE_COLUMNS,
+        {
+            "controller": [destination.name for destination in spec.destinations],
+            "unit": [destination.unit for destination in spec.destinations],
+            "pmus": (age.measured_ns[flow_of] != NEVER).sum(axis=0),
+            "age_mean_s": _mean_of_held(age.mean_ns(end_ns)[flow_of]) / NS_PER_S,
+            "age_peak_s": _mean_of_held(age.peak_mean_ns()[flow_of]) / NS_PER_S,
+            "age_max_s": np.fmax.reduce(age.max_ns(end_ns)[flow_of], axis=0) / NS_PER_S,
         },
     )
 
@@ -108,6 +175,7 @@ def write_links(path: Path, links: Sequence[LinkUse], duration_ns: int) -> None:
             "bytes": _counts(link.bytes for link in links),
             "dropped_queue": _counts(link.dropped_queue for link in links),
             "dropped_loss": _counts(link.dropped_loss for link in links),
+            "dropped_down": _counts(link.dropped_down for link in links),
             "utilisation": _counts(link.busy_ns for link in links) / whole_ns,
             "max_queue": _counts(link.max_queue for link in links),
         },
@@ -146,32 +214,41 @@ class PacketLog:
         arrivals_measured_ns: NDArray[np.int64],
         drops_measured_ns: NDArray[np.int64],
     ) -> None:
-        """Add the packets of an outcome, with the instants at which they were measured."""
+        """Add the packets of an outcome, with the instants at which they were measured.
+
+        They stand in the order in which they ended, arrivals before drops of the same instant.
+        """
         arrivals, drops = outcome.arrivals, outcome.drops
-        self._rows(arrivals, "arrival_ns", arrivals_measured_ns, np.uint8(DELIVERED))
-        self._rows(drops, "dropped_ns", drops_measured_ns, drops["reason"])
+        ended_ns = np.concatenate([arrivals["arrival_ns"], drops["dropped_ns"]])
+        order = np.argsort(ended_ns, kind="stable")
+        delivered = np.full(len(arrivals), DELIVERED, dtype=np.uint8)
+        measured_ns = np.concatenate([arrivals_measured_ns, drops_measured_ns])
+        sequences = np.concatenate([arrivals["sequence"], drops["sequence"]])
+        self._stream.append(
+            {
+                "flow": np.concatenate([self._flows(arrivals), self._flows(drops)])[order],
+                "sequence": sequences.astype(np.int64)[order],
+                "measured_ns": measured_ns[order],
+                "ended_ns": ended_ns[order],
+                "outcome": np.concatenate([delivered, drops["reason"]])[order],
+            }
+        )
 
     def close(self) -> None:
         """Finish the file."""
         self._stream.close()
 
-    def _rows(
-        self,
-        records: NDArray[np.void],
-        time: str,
-        measured_ns: NDArray[np.int64],
-        outcome: NDArray[np.uint8] | np.uint8,
-    ) -> None:
-        self._stream.append(
-            {
-                "flow": self._flow_of[records["source"], records["destination"]],
-                "sequence": records["sequence"].astype(np.int64),
-                "measured_ns": measured_ns,
-                "ended_ns": records[time],
-                "outcome": np.broadcast_to(outcome, len(records)),
-            }
-        )
+    def _flows(self, records: NDArray[np.void]) -> NDArray[np.int64]:
+        return self._flow_of[records["source"], records["destination"]]
 
 
 def _counts(values: Iterable[int]) -> NDArray[np.int64]:
     return np.fromiter(values, dtype=np.int64)
+
+
+def _mean_of_held(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (controllers,) the mean over the sources that have a value, NaN without any."""
+    has_value = ~np.isnan(values)
+    counts = has_value.sum(axis=0)
+    sums = np.where(has_value, values, 0.0).sum(axis=0)
+    return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)

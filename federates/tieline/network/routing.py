@@ -1,35 +1,137 @@
-"""Shortest-path routes: least delay, then fewest links, then the first found alphabetically."""
+"""Routes: shortest by delay, hops or cost, split among equals, or fixed by hand."""
 
-from collections.abc import Iterable
+import hashlib
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Literal
 
 import networkx as nx
 
 from tieline.network.spec import FRAME_BYTES, Link, Route, service_ns
 
+Metric = Literal["delay", "hops", "cost"]
+Pair = tuple[str, str]
+
+COST_UNITS = 1_000_000
+"""Costs are compared in millionths, so that sums of them are exact."""
+
+
+@dataclass(frozen=True)
+class Routing:
+    """How routes are found.
+
+    Attributes:
+        metric: what a route has least of: time of a PMU frame when nothing waits, links, or cost.
+        is_split: whether flows are spread over routes of equal length, each by its own number.
+        convergence_ns: from a failure or repair until routes follow it; None: they never do.
+        fixed: routes from one node to another that are never looked for.
+    """
+
+    metric: Metric = "delay"
+    is_split: bool = False
+    convergence_ns: int | None = None
+    fixed: Mapping[Pair, Route] = field(default_factory=dict)
+
+
+class Router:
+    """The routes of a network, some of whose links are down.
+
+    Nodes and links enter the search in alphabetical order, so the order in which a file or a
+    dictionary gives them changes nothing. Among routes of equal length the one of fewer links wins,
+    then the first alphabetically; if flows are split, all of equal length are taken in turn.
+    """
+
+    def __init__(
+        self,
+        routing: Routing,
+        nodes: Iterable[str],
+        links: Sequence[Link],
+        down: Collection[int] = (),
+    ) -> None:
+        self._routing = routing
+        self._graph: nx.Graph[str] = nx.Graph()
+        self._graph.add_nodes_from(sorted(nodes))
+        up = [link for number, link in enumerate(links) if number not in down]
+        # One more than any route has links: a route of fewer links wins among those of equal
+        # length, and never against a shorter one.
+        scale = 1 if routing.is_split else len(self._graph) + 1
+        for link in sorted(up, key=lambda link: sorted((link.a, link.b))):
+            length = _length(link, routing.metric) * scale + (0 if routing.is_split else 1)
+            self._graph.add_edge(*sorted((link.a, link.b)), length=length)
+        self._paths: dict[str, dict[str, list[str]]] = {}
+        self._before: dict[str, dict[str, list[str]]] = {}
+
+    def route(self, origin: str, target: str, flow: str = "") -> Route | None:
+        """Return the route of a flow, or None if there is none.
+
+        Args:
+            origin, target: its ends.
+            flow: names it; flows of different names are spread over equal routes.
+        """
+        fixed = self._routing.fixed.get((origin, target))
+        if fixed is not None:
+            return fixed
+        if self._routing.is_split:
+            return self._spread(origin, target, flow)
+        if origin not in self._paths:
+            self._paths[origin] = nx.single_source_dijkstra_path(
+                self._graph, origin, weight="length"
+            )
+        path = self._paths[origin].get(target)
+        return None if path is None else tuple(path)
+
+    def _spread(self, origin: str, target: str, flow: str) -> Route | None:
+        """Walk back from the target, at each node along one of the equal ways."""
+        if origin not in self._before:
+            before, _ = nx.dijkstra_predecessor_and_distance(self._graph, origin, weight="length")
+            self._before[origin] = before
+        ways = self._before[origin]
+        if target not in ways:
+            return None
+        path = [target]
+        while path[-1] != origin:
+            choices = sorted(ways[path[-1]])
+            path.append(choices[_number(f"{flow} at {path[-1]}") % len(choices)])
+        return tuple(reversed(path))
+
 
 def routes_from(
-    origins: Iterable[str], nodes: Iterable[str], links: Iterable[Link]
+    origins: Iterable[str], nodes: Iterable[str], links: Sequence[Link]
 ) -> dict[str, dict[str, Route]]:
-    """Return the route from each origin to every node that it reaches.
+    """Return the route of least delay from each origin to every node that it reaches."""
+    names = sorted(nodes)
+    router = Router(Routing(), names, links)
+    routes: dict[str, dict[str, Route]] = {}
+    for origin in sorted(set(origins)):
+        found = {target: router.route(origin, target) for target in names}
+        routes[origin] = {target: route for target, route in found.items() if route is not None}
+    return routes
 
-    The length of a link is the time that a PMU frame needs on it when nothing waits: serialisation
-    and propagation. Nodes and links enter the search in alphabetical order, so the order in which
-    a file or a dictionary gives them changes nothing.
+
+def fault_of(route: Route, links: Collection[Pair]) -> str | None:
+    """Return what is wrong with a route that was fixed by hand, or None.
+
+    Args:
+        route: its nodes.
+        links: the pairs of nodes that a link joins, both ways round.
     """
-    graph: nx.Graph[str] = nx.Graph()
-    graph.add_nodes_from(sorted(nodes))
-    # One more than any route has links: a route of fewer links wins among those of equal delay,
-    # and never against one of less delay.
-    scale = len(graph) + 1
-    for link in sorted(links, key=lambda link: sorted((link.a, link.b))):
-        delay_ns = service_ns(link, FRAME_BYTES) + link.propagation_ns
-        graph.add_edge(*sorted((link.a, link.b)), length=delay_ns * scale + 1)
-    return {
-        origin: {
-            target: tuple(path)
-            for target, path in nx.single_source_dijkstra_path(
-                graph, origin, weight="length"
-            ).items()
-        }
-        for origin in sorted(set(origins))
-    }
+    twice = [name for name in dict.fromkeys(route) if route.count(name) > 1]
+    if twice:
+        return f"is a loop: it passes {twice[0]} twice"
+    for pair in pairwise(route):
+        if pair not in links:
+            return f"uses a link {pair[0]}-{pair[1]} that there is not"
+    return None
+
+
+def _length(link: Link, metric: Metric) -> int:
+    if metric == "hops":
+        return 1
+    if metric == "cost":
+        return round(link.cost * COST_UNITS)
+    return service_ns(link, FRAME_BYTES) + link.propagation_ns
+
+
+def _number(name: str) -> int:
+    return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "little")

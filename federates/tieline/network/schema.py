@@ -2,69 +2,43 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
-from tieline.network.jitter import GammaJitter, Jitter, NormalJitter, UniformJitter
-from tieline.units import BitsPerSecond, Seconds, seconds_to_ns
+from tieline.network.entry import Entry
+from tieline.network.framing import FRAMINGS, MPLS_LABEL_BYTES
+from tieline.network.jitter import JITTERS, JitterEntry
+from tieline.network.losses import LOSSES, Bernoulli, Loss, LossEntry
+from tieline.network.queues import QUEUES, DropTail, Queue, QueueEntry
+from tieline.network.queues.drop_tail import MOST_PACKETS
+from tieline.network.spec import Transport
+from tieline.network.traffic import TRAFFIC
+from tieline.units import BitsPerSecond, Seconds
 
-MAX_QUEUE = 100_000
-
-
-class Entry(BaseModel):
-    """Refuses keys that it does not know."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class UniformEntry(Entry):
-    """Equally likely between two ends."""
-
-    distribution: Literal["uniform"]
-    low: Seconds = Field(ge=0, le=10)
-    high: Seconds = Field(ge=0, le=10)
-
-    @model_validator(mode="after")
-    def _ordered(self) -> "UniformEntry":
-        if self.low > self.high:
-            raise ValueError(f"'low' must not exceed 'high' ({self.low:g} s > {self.high:g} s)")
-        return self
-
-    def jitter(self) -> Jitter:
-        """Return the distribution."""
-        return UniformJitter(seconds_to_ns(self.low), seconds_to_ns(self.high))
-
-
-class NormalEntry(Entry):
-    """A normal distribution cut to [0, 2 mean]."""
-
-    distribution: Literal["normal"]
-    mean: Seconds = Field(ge=1e-9, le=10)
-    deviation: Seconds = Field(ge=1e-9, le=10)
-
-    def jitter(self) -> Jitter:
-        """Return the distribution."""
-        return NormalJitter(seconds_to_ns(self.mean), seconds_to_ns(self.deviation))
-
-
-class GammaEntry(Entry):
-    """A gamma distribution."""
-
-    distribution: Literal["gamma"]
-    mean: Seconds = Field(ge=1e-9, le=10)
-    deviation: Seconds = Field(ge=1e-9, le=10)
-
-    def jitter(self) -> Jitter:
-        """Return the distribution."""
-        return GammaJitter(seconds_to_ns(self.mean), seconds_to_ns(self.deviation))
-
-
-JITTERS: dict[str, type[Entry]] = {
-    "uniform": UniformEntry,
-    "normal": NormalEntry,
-    "gamma": GammaEntry,
+TAGGED: dict[str, dict[str, type[Entry]]] = {
+    "distribution": JITTERS,
+    "model": LOSSES,
+    "discipline": QUEUES,
+    "kind": TRAFFIC,
 }
-JitterEntry = Annotated[
-    UniformEntry | NormalEntry | GammaEntry, Field(discriminator="distribution")
+"""The words by which entries of several kinds tell which they are."""
+
+
+def _plain_or_mapping(value: Any) -> str:
+    return "mapping" if isinstance(value, dict | Entry) else "plain"
+
+
+PlainOrMapping = Discriminator(_plain_or_mapping)
+"""Tells a number from a model with its parameters, so that each fault is told once."""
+
+QueueOrLimit = Annotated[
+    Annotated[int, Field(ge=1, le=MOST_PACKETS, strict=True), Tag("plain")]
+    | Annotated[QueueEntry, Tag("mapping")],
+    PlainOrMapping,
+]
+LossOrShare = Annotated[
+    Annotated[float, Field(ge=0, lt=1, strict=True), Tag("plain")]
+    | Annotated[LossEntry, Tag("mapping")],
+    PlainOrMapping,
 ]
 
 
@@ -80,10 +54,21 @@ class LinkDefaults(Entry):
     """What a link takes where its own entry is silent."""
 
     rate: BitsPerSecond | None = Field(None, ge=1, le=1e13)
-    queue: int | None = Field(None, ge=1, le=MAX_QUEUE, strict=True)
-    loss: float | None = Field(None, ge=0, lt=1, strict=True)
+    queue: QueueOrLimit | None = None
+    loss: LossOrShare | None = None
     jitter: JitterEntry | None = None
     overhead: int | None = Field(None, ge=0, le=1000, strict=True)
+    framing: Literal["ethernet", "ppp", "ppp_hdlc", "t1", "sonet"] | None = None
+    mpls_labels: int | None = Field(None, ge=0, le=16, strict=True)
+    duplex: Literal["full", "half"] | None = None
+    mtu: int | None = Field(None, ge=68, le=65_535, strict=True)
+    cost: float | None = Field(None, gt=0, le=1e9)
+
+    @model_validator(mode="after")
+    def _one_overhead(self) -> "LinkDefaults":
+        if self.overhead is not None and self.framing is not None:
+            raise ValueError("'overhead' and 'framing' say the same thing: give one of them")
+        return self
 
 
 class LinkEntry(LinkDefaults):
@@ -94,29 +79,107 @@ class LinkEntry(LinkDefaults):
     propagation: Seconds = Field(ge=0, le=10)
 
     def filled(self, defaults: LinkDefaults) -> dict[str, Any]:
-        """Return rate, queue, loss, jitter and overhead, from the defaults where not given."""
+        """Return what links have in common, from the defaults where not given."""
         names = LinkDefaults.model_fields
         own = {name: getattr(self, name) for name in names}
-        return {
+        given = {
             name: getattr(defaults, name) if value is None else value for name, value in own.items()
         }
+        # A link's own overhead, or framing, replaces whichever the defaults have.
+        if self.overhead is not None:
+            given["framing"] = None
+        elif self.framing is not None:
+            given["overhead"] = None
+        return given
 
 
-class ProcessingEntry(Entry):
-    """The time that a device needs for a frame, and its jitter."""
+class PmuEntry(Entry):
+    """The PMUs: time until a frame leaves, and how the frames travel."""
+
+    processing: Seconds = Field(0.0, ge=0, le=10)
+    jitter: JitterEntry | None = None
+    transport: Transport = "unicast"
+    dscp: int = Field(0, ge=0, le=63, strict=True)
+
+
+class ControllerEntry(Entry):
+    """The controllers: time until they can use a frame."""
 
     processing: Seconds = Field(0.0, ge=0, le=10)
     jitter: JitterEntry | None = None
 
 
-class CrossEntry(Entry):
-    """Background traffic between two nodes."""
+class RoutingEntry(Entry):
+    """How routes are found, and whether they are found again after a failure."""
 
-    kind: Literal["cbr", "poisson"]
+    metric: Literal["delay", "hops", "cost"] = "delay"
+    equal_cost: Literal["first", "split"] = "first"
+    convergence: Seconds | None = Field(None, ge=0, le=1e4)
+
+
+class RouteEntry(Entry):
+    """A route that is fixed by hand."""
+
     origin: str = Field(alias="from")
     target: str = Field(alias="to")
-    rate: BitsPerSecond = Field(ge=1, le=1e13)
-    payload: int = Field(ge=1, le=65_000, strict=True)
+    via: list[str] = Field(default_factory=list)
+
+
+class EventEntry(Entry):
+    """Something that happens to links at a time, for a time or for good."""
+
+    at: Seconds = Field(ge=0, le=1e6)
+    lasts: Seconds | None = Field(None, alias="for", gt=0, le=1e6)
+    event: Literal["link_down", "node_down", "rate", "loss"]
+    link: list[str] | None = Field(None, min_length=2, max_length=2)
+    node: str | None = None
+    rate: BitsPerSecond | None = Field(None, ge=1, le=1e13)
+    probability: float | None = Field(None, gt=0, lt=1, strict=True)
+
+    @model_validator(mode="after")
+    def _complete(self) -> "EventEntry":
+        needs = {
+            "link_down": ("link",),
+            "node_down": ("node",),
+            "rate": ("link", "rate"),
+            "loss": ("probability",),
+        }[self.event]
+        missing = [name for name in needs if getattr(self, name) is None]
+        if missing:
+            raise ValueError(f"event '{self.event}' needs '{missing[0]}'")
+        allowed = {*needs, "link"} if self.event == "loss" else set(needs)
+        given = {"link", "node", "rate", "probability"} & self.model_fields_set
+        if given - allowed:
+            raise ValueError(f"event '{self.event}' takes no '{min(given - allowed)}'")
+        return self
+
+
+def overhead_of(given: dict[str, Any]) -> int:
+    """Return the bytes that a link's layer adds to a packet."""
+    labels = (given["mpls_labels"] or 0) * MPLS_LABEL_BYTES
+    if given["framing"] is not None:
+        return FRAMINGS[given["framing"]].overhead_bytes + labels
+    return int(given["overhead"] or 0) + labels
+
+
+def rate_of(given: dict[str, Any]) -> int:
+    """Return the rate at which a link carries packets, bit/s."""
+    share = 1.0 if given["framing"] is None else FRAMINGS[given["framing"]].share
+    return max(1, round(given["rate"] * share))
+
+
+def queue_of(given: Any) -> Queue:
+    """Return a queue, of which a number is the packets that it holds."""
+    queue: Queue = DropTail(given) if isinstance(given, int) else given.queue()
+    return queue
+
+
+def loss_of(given: Any) -> Loss | None:
+    """Return a loss model, of which a number is the probability."""
+    if given is None or given == 0:
+        return None
+    loss: Loss = Bernoulli(given) if isinstance(given, float | int) else given.loss()
+    return loss
 
 
 def allowed_keys(model: type[Entry]) -> list[str]:

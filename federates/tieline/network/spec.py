@@ -7,13 +7,18 @@ from itertools import pairwise
 from typing import Any, Literal
 
 from tieline.network.jitter import Jitter
+from tieline.network.losses import Loss
+from tieline.network.queues import Queue
+from tieline.network.traffic import HEADER_BYTES, Traffic
 from tieline.units import NS_PER_S
 
 FRAME_BYTES = 34
 """An IEEE C37.118.2 data frame with one float phasor, FREQ and DFREQ as floats."""
 
-HEADER_BYTES = 8 + 20
-"""UDP and IPv4 headers, which every packet carries besides its payload and the link's own."""
+ETHERNET_MTU = 1500
+"""Largest IP packet of a link that says nothing else, bytes."""
+
+Transport = Literal["unicast", "multicast", "tcp"]
 
 Route = tuple[str, ...]
 """The nodes that a packet passes, first and last included; one node is no link at all."""
@@ -34,26 +39,33 @@ class Node:
 
 @dataclass(frozen=True)
 class Link:
-    """A full-duplex point-to-point link; each direction has this rate and a queue of its own.
+    """A point-to-point link; each direction has this rate and a queue of its own.
 
     Attributes:
         a, b: the nodes at its ends.
         rate_bps: bits a second, link-layer bytes included.
         propagation_ns: from the last bit sent to the last bit received.
-        queue_packets: packets that may wait besides the one in transmission; more are dropped.
-        loss_probability: of each packet, on its own, after it has used the link.
+        queue: what becomes of packets that must wait.
+        loss: of packets that have used the link, or none; each direction on its own.
         jitter: added to the propagation of each packet, or none.
         overhead_bytes: what the link layer adds to each packet.
+        is_half_duplex: whether only one end sends at a time; the turn goes to the other end after
+            each packet, if anything waits there.
+        mtu_bytes: the largest IP packet that it takes.
+        cost: what routing by cost counts.
     """
 
     a: str
     b: str
     rate_bps: int
     propagation_ns: int
-    queue_packets: int
-    loss_probability: float = 0.0
+    queue: Queue
+    loss: Loss | None = None
     jitter: Jitter | None = None
     overhead_bytes: int = 0
+    is_half_duplex: bool = False
+    mtu_bytes: int = ETHERNET_MTU
+    cost: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -93,28 +105,94 @@ class CrossFlow:
     """Traffic that only fills queues.
 
     Attributes:
-        name: names its random stream.
-        kind: `cbr` (equal gaps, from a random phase) or `poisson` (exponential gaps).
-        rate_bps: mean rate of payload and UDP and IPv4 headers, without the link layer's bytes.
-        payload_bytes: the same for every packet.
+        name: names its random streams.
+        traffic: when its datagrams leave, and how large they are.
         route: the nodes that it passes.
+        back: the way of replies and acknowledgements; the same backwards, if not given.
+        dscp: its mark.
+        start_ns, stop_ns: when it begins and ends; it does not end without `stop_ns`.
     """
 
     name: str
-    kind: Literal["cbr", "poisson"]
-    rate_bps: float
-    payload_bytes: int
+    traffic: Traffic
     route: Route
+    back: Route = ()
+    dscp: int = 0
+    start_ns: int = 0
+    stop_ns: int | None = None
 
     @property
-    def gap_ns(self) -> float:
-        """Mean time between two packets."""
-        return (self.payload_bytes + HEADER_BYTES) * 8 * NS_PER_S / self.rate_bps
+    def way_back(self) -> Route:
+        """Return the nodes that replies pass."""
+        return self.back or self.route[::-1]
+
+
+@dataclass(frozen=True)
+class LinkCut:
+    """A link goes down, with all that is on it or waits for it."""
+
+    at_ns: int
+    link: int
+
+
+@dataclass(frozen=True)
+class LinkRepair:
+    """A link that was down works again."""
+
+    at_ns: int
+    link: int
+
+
+@dataclass(frozen=True)
+class RateChange:
+    """A link gets another rate; a packet in transmission keeps the old one."""
+
+    at_ns: int
+    link: int
+    rate_bps: int
+
+
+@dataclass(frozen=True)
+class LossChange:
+    """A link loses packets at random besides its own losses, until the next such change.
+
+    Attributes:
+        probability: of each packet, 0 to end it.
+    """
+
+    at_ns: int
+    link: int
+    probability: float
+
+
+@dataclass(frozen=True)
+class Reroute:
+    """Some flows take other routes from now on; packets under way keep theirs.
+
+    Attributes:
+        routes: by number: PMU flows, then cross flows.
+        ways_back: of cross flows, by the same number.
+    """
+
+    at_ns: int
+    routes: Mapping[int, Route]
+    ways_back: Mapping[int, Route]
+
+
+Change = LinkCut | LinkRepair | RateChange | LossChange | Reroute
 
 
 @dataclass(frozen=True)
 class NetworkSpec:
-    """A whole network. The flows stand in the order (source, destination), one for each pair."""
+    """A whole network. The flows stand in the order (source, destination), one for each pair.
+
+    Attributes:
+        transport: of PMU frames: a UDP packet to each controller, one packet along a tree to all of
+            them, or a connection to each (`network/packet/tcp.py`).
+        dscp: the mark of PMU frames.
+        changes: what happens to the network, in the order of time; before all else of an instant.
+        taps: links (numbers) that are listened to.
+    """
 
     nodes: tuple[Node, ...]
     links: tuple[Link, ...]
@@ -122,6 +200,10 @@ class NetworkSpec:
     destinations: tuple[Destination, ...]
     flows: tuple[Flow, ...]
     cross_flows: tuple[CrossFlow, ...] = ()
+    transport: Transport = "unicast"
+    dscp: int = 0
+    changes: tuple[Change, ...] = ()
+    taps: tuple[int, ...] = ()
 
     @cached_property
     def ports(self) -> dict[tuple[str, str], int]:
@@ -170,8 +252,12 @@ def packet_bytes(link: Link, payload_bytes: int) -> int:
 
 def service_ns(link: Link, payload_bytes: int) -> int:
     """Return the serialisation time of a packet on a link, rounded to the nearest nanosecond."""
-    bits = 8 * packet_bytes(link, payload_bytes)
-    return (2 * bits * NS_PER_S + link.rate_bps) // (2 * link.rate_bps)
+    return serialisation_ns(packet_bytes(link, payload_bytes), link.rate_bps)
+
+
+def serialisation_ns(size: int, rate_bps: int) -> int:
+    """Return how long some bytes take at a rate, rounded to the nearest nanosecond."""
+    return (16 * size * NS_PER_S + rate_bps) // (2 * rate_bps)
 
 
 def unloaded_delay_ns(spec: NetworkSpec, flow: Flow) -> float:

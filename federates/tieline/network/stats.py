@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tieline.compiled import compiled
-from tieline.network.engine import LOSS, QUEUE_FULL, Outcome
+from tieline.network.engine import LINK_DOWN, LOSS, NO_ARRIVALS, NO_DROPS, QUEUE_FULL, Outcome
 from tieline.network.histogram import BINS, bin_of, percentile_ns
+from tieline.network.sequence import LOST, SequenceFigures, SequenceStatistics
 
 DELAY_BIN_NS = 100_000
 """Width of the bins of the histogram over all flows."""
@@ -14,19 +15,18 @@ DELAY_BINS = 200_000
 """They reach to 20 s; one more takes what is longer."""
 
 # Columns of a flow's delays.
-_COUNT, _SUM, _LEAST, _MOST, _LAST, _STEPS = range(6)
+_COUNT, _SUM, _LEAST, _MOST, _LAST = range(5)
 
 
 class FlowStatistics:
     """What became of the packets of each flow, and how long they took.
 
     The delay of a packet is its combined delay, from the measurement to the instant at which the
-    controller can use it. A flow's jitter is the mean absolute difference of the delays of packets
-    that arrived one after the other (the IP packet delay variation of RFC 3393, taken over
-    consecutive arrivals).
+    controller can use it: the one-way delay of RFC 7679 with the processing at both ends added.
+    `docs/network_statistics.md` defines every figure.
 
     Attributes:
-        sent, delivered, dropped_queue, dropped_loss: (flows,) packets so far.
+        sent, delivered, dropped_queue, dropped_loss, dropped_down: (flows,) packets so far.
         delay_counts: (DELAY_BINS + 1,) delivered packets of all flows by delay.
 
     Args:
@@ -41,10 +41,14 @@ class FlowStatistics:
         self.sent = np.zeros(flows, dtype=np.int64)
         self.dropped_queue = np.zeros(flows, dtype=np.int64)
         self.dropped_loss = np.zeros(flows, dtype=np.int64)
+        self.dropped_down = np.zeros(flows, dtype=np.int64)
         self.delay_counts = np.zeros(DELAY_BINS + 1, dtype=np.int64)
-        self._delays = np.zeros((flows, 6), dtype=np.int64)
+        self._delays = np.zeros((flows, 5), dtype=np.int64)
+        self._smoothed_ns = np.zeros(flows)
         self._bins = np.zeros((flows, BINS), dtype=np.uint32)
-        self.add(Outcome(_NONE, _NONE), _NO_TIMES)
+        self._order = SequenceStatistics(flows)
+        # Compiles, where that is still to be done, before the federation waits for an answer.
+        self.add(Outcome(NO_ARRIVALS, NO_DROPS), np.empty(0, np.int64))
 
     @property
     def delivered(self) -> NDArray[np.int64]:
@@ -54,11 +58,14 @@ class FlowStatistics:
     @property
     def in_flight(self) -> NDArray[np.int64]:
         """Packets sent that have neither been delivered nor dropped."""
-        return self.sent - self.delivered - self.dropped_queue - self.dropped_loss
+        dropped = self.dropped_queue + self.dropped_loss + self.dropped_down
+        return self.sent - self.delivered - dropped
 
-    def add_sent(self, sources: NDArray[np.int64]) -> None:
-        """Count one packet from each of these sources to every destination."""
-        self.sent[self._flow_of[sources].ravel()] += 1
+    def add_sent(self, sources: NDArray[np.int64], sequence: int) -> None:
+        """Count packet `sequence` from each of these sources to every destination."""
+        flows = self._flow_of[sources].ravel()
+        self.sent[flows] += 1
+        self._order.add_sent(flows, sequence)
 
     def add(self, outcome: Outcome, measured_ns: NDArray[np.int64]) -> None:
         """Take what ended.
@@ -66,15 +73,34 @@ class FlowStatistics:
         Args:
             outcome: arrivals in order, and drops.
             measured_ns: (arrivals,) when each frame that arrived was measured.
+
+        Raises:
+            CosimError: a packet ended twice.
         """
         arrivals, drops = outcome.arrivals, outcome.drops
         flows = self._flow_of[arrivals["source"], arrivals["destination"]]
         delays_ns = arrivals["arrival_ns"] - measured_ns
-        _add_delays(flows, delays_ns, self._least_ns, self._delays, self._bins, self.delay_counts)
+        _add_delays(
+            flows,
+            delays_ns,
+            self._least_ns,
+            self._delays,
+            self._smoothed_ns,
+            self._bins,
+            self.delay_counts,
+        )
+        self._order.add(flows, arrivals["sequence"].astype(np.int64), delays_ns)
         if len(drops):
             dropped = self._flow_of[drops["source"], drops["destination"]]
             np.add.at(self.dropped_queue, dropped[drops["reason"] == QUEUE_FULL], 1)
             np.add.at(self.dropped_loss, dropped[drops["reason"] == LOSS], 1)
+            np.add.at(self.dropped_down, dropped[drops["reason"] == LINK_DOWN], 1)
+            ends = np.full(len(drops), LOST)
+            self._order.add(dropped, drops["sequence"].astype(np.int64), ends)
+
+    def order(self) -> SequenceFigures:
+        """Return what is defined over sequence numbers."""
+        return self._order.figures()
 
     def mean_ns(self) -> NDArray[np.float64]:
         """Return each flow's mean delay; NaN where nothing arrived, here and below."""
@@ -89,9 +115,16 @@ class FlowStatistics:
         return self._where_delivered(self._delays[:, _MOST])
 
     def jitter_ns(self) -> NDArray[np.float64]:
-        """Return each flow's jitter; NaN where less than two packets arrived."""
-        pairs = self.delivered - 1
-        return np.where(pairs > 0, self._delays[:, _STEPS] / np.maximum(pairs, 1), np.nan)
+        """Return each flow's mean absolute IP packet delay variation (RFC 3393).
+
+        It is taken over packets with consecutive numbers that were both delivered, in whatever
+        order they arrived; NaN where there is no such pair.
+        """
+        return self.order().variation_ns
+
+    def smoothed_jitter_ns(self) -> NDArray[np.float64]:
+        """Return each flow's interarrival jitter of RFC 3550, section 6.4.1, after its last one."""
+        return np.where(self.delivered > 1, self._smoothed_ns, np.nan)
 
     def percentiles_ns(self, share: float) -> NDArray[np.float64]:
         """Return the delay that `share` of each flow's packets do not exceed."""
@@ -105,18 +138,13 @@ class FlowStatistics:
         return np.where(self.delivered > 0, values, np.nan)
 
 
-_NONE = np.empty(
-    0, [("arrival_ns", "<i8"), ("source", "<u2"), ("destination", "<u2"), ("reason", "u1")]
-)
-_NO_TIMES = np.empty(0, np.int64)
-
-
 @compiled
 def _add_delays(
     flows: NDArray[np.int64],
     delays_ns: NDArray[np.int64],
     least_ns: NDArray[np.int64],
     delays: NDArray[np.int64],
+    smoothed_ns: NDArray[np.float64],
     bins: NDArray[np.uint32],
     counts: NDArray[np.int64],
 ) -> None:
@@ -128,7 +156,8 @@ def _add_delays(
         if delays[flow, _COUNT] == 0:
             delays[flow, _LEAST] = delay_ns
         else:
-            delays[flow, _STEPS] += abs(delay_ns - delays[flow, _LAST])
+            step_ns = abs(delay_ns - delays[flow, _LAST])
+            smoothed_ns[flow] += (step_ns - smoothed_ns[flow]) / 16
         delays[flow, _COUNT] += 1
         delays[flow, _SUM] += delay_ns
         delays[flow, _LEAST] = min(delays[flow, _LEAST], delay_ns)

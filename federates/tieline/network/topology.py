@@ -1,17 +1,21 @@
 """Reads a topology file, refuses a faulty one, and resolves it to a `NetworkSpec`."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from tieline.errors import InputError
-from tieline.network.entries import Entries, Sites
+from tieline.network.entries import Entries, Sites, jitter_of
+from tieline.network.events import changes_of, rerouted
+from tieline.network.linkless import least_delay_without_links_ns
 from tieline.network.ns3.limits import check_carried
-from tieline.network.routing import routes_from
+from tieline.network.routing import Router, Routing
 from tieline.network.settings import NetworkSettings
 from tieline.network.spec import (
     CrossFlow,
     Destination,
     Flow,
+    Link,
     NetworkSpec,
     Route,
     Source,
@@ -40,9 +44,9 @@ def read_topology(
         InputError: whatever is wrong with the file, all of it in one error, each finding with
             `file:line`; or a `mean_delay` below the mean that the topology has anyway.
     """
-    entries = Entries(load(path), sources, destinations, settings.loss)
+    entries = Entries(load(path), sources, destinations, settings)
     entries.refuse()
-    return lengthened(_resolved(entries, settings.cross_traffic), settings, path)
+    return lengthened(_resolved(entries, settings), settings, path)
 
 
 def network_spec(
@@ -65,10 +69,8 @@ def network_spec(
         if settings.engine == "ns3":
             check_carried(spec)
         return spec
-    if settings.engine == "constant" and settings.delay is None:
-        raise InputError("network.delay must be given with network.engine constant")
-    delay_s = settings.delay if settings.engine == "constant" else None
-    return direct_spec(sources, destinations, seconds_to_ns(delay_s or 0.0))
+    least_ns = least_delay_without_links_ns(settings, sources, destinations)
+    return direct_spec(sources, destinations, least_ns)
 
 
 def mean_unloaded_delay_ns(spec: NetworkSpec) -> float:
@@ -97,42 +99,95 @@ def lengthened(spec: NetworkSpec, settings: NetworkSettings, path: Path) -> Netw
     return replace(spec, sources=sources)
 
 
-def _resolved(entries: Entries, cross_traffic: float) -> NetworkSpec:
+def _resolved(entries: Entries, settings: NetworkSettings) -> NetworkSpec:
     """Return the network of entries without fault, every route found."""
+    pmu = seconds_to_ns(entries.pmu.processing), jitter_of(entries.pmu.jitter)
+    controller = seconds_to_ns(entries.controller.processing), jitter_of(entries.controller.jitter)
     at_bus = entries.at_bus
     sources = tuple(
-        Source(site["name"], site["bus"], at_bus[site["bus"]], *entries.pmu)
-        for site in entries.sources
+        Source(site["name"], site["bus"], at_bus[site["bus"]], *pmu) for site in entries.sources
     )
     destinations = tuple(
-        Destination(
-            site["name"], site["unit"], site["bus"], at_bus[site["bus"]], *entries.controller
-        )
+        Destination(site["name"], site["unit"], site["bus"], at_bus[site["bus"]], *controller)
         for site in entries.destinations
     )
-    origins = {source.node for source in sources} | {entry.origin for entry in entries.cross}
-    routes = routes_from(origins, (node.name for node in entries.nodes), entries.links)
+    routing = _routing(entries)
+    names = [node.name for node in entries.nodes]
+    ends = [(source.node, place.node) for source in sources for place in destinations]
+    router = Router(routing, names, entries.links)
     flows = tuple(
-        Flow(i, j, routes[source.node][destination.node])
-        for i, source in enumerate(sources)
-        for j, destination in enumerate(destinations)
+        Flow(*divmod(number, len(destinations)), _found(router, *pair, f"flow {number}"))
+        for number, pair in enumerate(ends)
     )
-    cross_flows = _cross_flows(entries, cross_traffic, routes)
-    return NetworkSpec(entries.nodes, entries.links, sources, destinations, flows, cross_flows)
+    cross_flows = _cross_flows(entries, settings.cross_traffic, router)
+    changes = changes_of(entries.events, entries.links)
+    if routing.convergence_ns is not None:
+
+        def route_of(down: frozenset[int]) -> Callable[[str, str, str], Route | None]:
+            return Router(routing, names, entries.links, down).route
+
+        changes = rerouted(changes, routing.convergence_ns, flows, cross_flows, ends, route_of)
+    return NetworkSpec(
+        entries.nodes,
+        entries.links,
+        sources,
+        destinations,
+        flows,
+        cross_flows,
+        settings.transport or entries.pmu.transport,
+        entries.pmu.dscp if settings.dscp is None else settings.dscp,
+        tuple(changes),
+        _taps(entries.links, settings.capture),
+    )
 
 
-def _cross_flows(
-    entries: Entries, factor: float, routes: dict[str, dict[str, Route]]
-) -> tuple[CrossFlow, ...]:
+def _routing(entries: Entries) -> Routing:
+    stated = entries.routing
+    wait_s = stated.convergence
+    return Routing(
+        stated.metric,
+        stated.equal_cost == "split",
+        None if wait_s is None else seconds_to_ns(wait_s),
+        entries.fixed,
+    )
+
+
+def _found(router: Router, origin: str, target: str, flow: str) -> Route:
+    """Return a route that there must be: every network is connected."""
+    route = router.route(origin, target, flow)
+    if route is None:
+        raise InputError(f"no route from {origin} to {target}")
+    return route
+
+
+def _cross_flows(entries: Entries, factor: float, router: Router) -> tuple[CrossFlow, ...]:
     if factor == 0:
         return ()
-    return tuple(
-        CrossFlow(
-            f"cross flow {index}",
-            entry.kind,
-            entry.rate * factor,
-            entry.payload,
-            routes[entry.origin][entry.target],
+    flows = []
+    for index, entry in enumerate(entries.cross):
+        name, ends = f"cross flow {index}", (entry.origin, entry.target)
+        flows.append(
+            CrossFlow(
+                name,
+                entry.traffic().scaled(factor),
+                _found(router, *ends, name),
+                _found(router, *ends[::-1], name),
+                entry.dscp,
+                seconds_to_ns(entry.start),
+                None if entry.stop is None else seconds_to_ns(entry.stop),
+            )
         )
-        for index, entry in enumerate(entries.cross)
-    )
+    return tuple(flows)
+
+
+def _taps(links: Sequence[Link], capture: Sequence[tuple[str, str]]) -> tuple[int, ...]:
+    """Return the numbers of the links that are listened to.
+
+    Raises:
+        InputError: there is no such link.
+    """
+    numbers = {frozenset((link.a, link.b)): number for number, link in enumerate(links)}
+    missing = [pair for pair in capture if frozenset(pair) not in numbers]
+    if missing:
+        raise InputError(f"network.capture: there is no link {'-'.join(missing[0])}")
+    return tuple(sorted({numbers[frozenset(pair)] for pair in capture}))

@@ -6,8 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tieline.errors import CosimError
+from tieline.network.draws import CHUNK
 from tieline.network.engine import (
     DELIVERED,
+    LINK_COUNTER,
+    LINK_DOWN,
     LOSS,
     QUEUE_FULL,
     Counts,
@@ -16,9 +19,9 @@ from tieline.network.engine import (
     check_not_late,
 )
 from tieline.network.ns3.build import built
-from tieline.network.packet.build import Supplies, Traces
+from tieline.network.packet.draws import jitters
 from tieline.network.packet.endings import Endings
-from tieline.network.packet.memory import DRAWS_CHUNK, END_FLOW, END_HOW, END_TIME, NO_STREAM
+from tieline.network.packet.memory import END_FLOW, END_HOW, END_TIME
 from tieline.network.packet.pmu import Pmu
 from tieline.network.spec import FRAME_BYTES, NetworkSpec
 
@@ -31,34 +34,29 @@ class Ns3Engine:
     random numbers for losses, cross traffic and processing, and order simultaneous events alike.
     The link layer's bytes beyond PPP's two trail each packet on its link, as a frame check does.
 
-    Not modelled: what the packet engine leaves out, and jitter on links. A process can hold one
-    such engine at a time.
+    Not modelled: what `limits.py` refuses, and what the packet engine leaves out. A process can
+    hold one such engine at a time.
 
     Args:
         spec: the network.
         seed: the experiment's seed; each random thing has its own stream of it.
-        traces: instants (ns, ascending) at which a cross flow sends, by the flow's name, in place
-            of its random arrivals.
 
     Raises:
         InputError: ns-3 is not installed, or cannot carry the network.
         CosimError: another engine of this kind is open.
     """
 
-    def __init__(self, spec: NetworkSpec, seed: int, traces: Traces | None = None) -> None:
+    def __init__(self, spec: NetworkSpec, seed: int) -> None:
         self._spec = spec
-        self._supplies = Supplies(seed)
         self._pmus = [Pmu(source, seed) for source in spec.sources]
-        self._processing = _Processing(spec, self._supplies)
-        self._endings = Endings(spec.flows)
-        self._flows_of = np.bincount(
-            np.array([flow.source for flow in spec.flows], dtype=np.int64),
-            minlength=len(spec.sources),
-        )
+        self._processing = _Processing(spec, seed)
+        self._endings = Endings(spec)
+        self._flows_of = self._endings.flows_of_sources()
         self.lookahead_ns = spec.lookahead_ns
         self._now_ns = -1
         self._sent = 0
-        self._network, self._filled = built(spec, self._supplies, traces or {})
+        self._max_queue = np.zeros(len(spec.ports), dtype=np.int64)
+        self._network, self._filled = built(spec, seed)
 
     def send(
         self,
@@ -104,7 +102,7 @@ class Ns3Engine:
     def counts(self) -> Counts:
         """Return the counts of PMU and cross packets at the instant of the last `run_until`."""
         [cross] = _table(self._network.CopyCross, 1, 4)
-        ended = self._endings.counts + cross[1:]
+        ended = self._endings.counts[:LINK_DOWN] + cross[1:]
         inside = self._network.PacketsInside() + self._network.PacketsAnnounced()
         return Counts(
             sent=self._sent + int(cross[0]),
@@ -116,20 +114,46 @@ class Ns3Engine:
 
     def links(self) -> list[LinkUse]:
         """Return what each link carried up to the last `run_until`, direction by direction."""
-        rows = _table(self._network.CopyPorts, len(self._spec.ports), 6)
+        rows = self._port_counters()
+        most = np.maximum(self._max_queue, rows["max_queue"])
         return [
-            LinkUse(origin, target, self._spec.links[port // 2].rate_bps, *rows[port].tolist())
+            LinkUse(
+                origin,
+                target,
+                self._spec.links[port // 2].rate_bps,
+                packets=int(rows["packets"][port]),
+                bytes=int(rows["bytes"][port]),
+                dropped_queue=int(rows["dropped_queue"][port]),
+                dropped_loss=int(rows["dropped_loss"][port]),
+                busy_ns=int(rows["busy_ns"][port]),
+                max_queue=int(most[port]),
+            )
             for (origin, target), port in self._spec.ports.items()
         ]
 
+    def link_counters(self) -> NDArray[np.void]:
+        """Return the counters of each link's directions, and begin a new span for `max_queue`."""
+        counters = self._port_counters()
+        np.maximum(self._max_queue, counters["max_queue"], out=self._max_queue)
+        self._network.BeginSpan()
+        return counters
+
     def close(self) -> None:
-        """Let go of all that ns-3 holds; no other method may be called after."""
-        del self._network
+        """Let go of all that ns-3 holds; again does nothing."""
+        self._network = None
+
+    def _port_counters(self) -> NDArray[np.void]:
+        names = LINK_COUNTER.names or ()
+        table = _table(self._network.CopyPorts, len(self._spec.ports), len(names))
+        counters = np.empty(len(table), LINK_COUNTER)
+        for column, name in enumerate(names):
+            counters[name] = table[:, column]
+        return counters
 
     def _refill(self) -> None:
         for supply, chunks in self._filled.items():
             if self._network.IsLow(supply):
-                self._network.Fill(supply, next(chunks), DRAWS_CHUNK)
+                self._network.Fill(supply, next(chunks), CHUNK)
 
 
 def _table(copy: Callable[[NDArray[np.int64]], None], rows: int, columns: int) -> NDArray[np.int64]:
@@ -143,19 +167,15 @@ def _table(copy: Callable[[NDArray[np.int64]], None], rows: int, columns: int) -
 class _Processing:
     """The time that controllers take for each packet, in the order in which packets reach them."""
 
-    def __init__(self, spec: NetworkSpec, supplies: Supplies) -> None:
+    def __init__(self, spec: NetworkSpec, seed: int) -> None:
         self._destination_of = np.array([flow.destination for flow in spec.flows], dtype=np.int64)
         self._processing_ns = np.array(
             [place.processing_ns for place in spec.destinations], dtype=np.int64
         )
-        streams = [
-            supplies.jitter(f"processing of {place.name}", place.jitter)
-            for place in spec.destinations
-        ]
         self._chunks = {
-            number: supplies.chunks[stream]
-            for number, stream in enumerate(streams)
-            if stream != NO_STREAM
+            number: jitters(seed, f"processing of {place.name}", place.jitter)
+            for number, place in enumerate(spec.destinations)
+            if place.jitter is not None
         }
         self._drawn = {number: np.empty(0, np.int64) for number in self._chunks}
 

@@ -7,7 +7,10 @@ from typing import Any
 from tieline.errors import InputError
 from tieline.network.ns3.addresses import routes_of
 from tieline.network.ns3.library import check_installed
-from tieline.network.spec import NetworkSpec
+from tieline.network.queues import DropTail
+from tieline.network.spec import FRAME_BYTES, CrossFlow, NetworkSpec, Route
+from tieline.network.traffic import HEADER_BYTES
+from tieline.network.traffic.base import Acknowledged, Answered
 
 MOST_DESTINATIONS = 50_000
 """Each has a UDP port of its own, from 10,000 on."""
@@ -16,15 +19,14 @@ MOST_HOPS = 254
 """The IPv4 header's time to live counts them."""
 
 _CARRIED = {
-    "link": {"a", "b", "rate_bps", "propagation_ns", "queue_packets", "loss_probability"}
-    | {"overhead_bytes"},
+    "network": {"nodes", "links", "sources", "destinations", "flows", "cross_flows", "dscp"},
+    "link": {"a", "b", "rate_bps", "propagation_ns", "queue", "loss", "overhead_bytes"}
+    | {"mtu_bytes", "cost"},
     "PMU": {"name", "bus", "node", "processing_ns", "jitter"},
     "controller": {"name", "unit", "bus", "node", "processing_ns", "jitter"},
     "flow": {"source", "destination", "route"},
-    "cross flow": {"name", "kind", "rate_bps", "payload_bytes", "route"},
-    "network": {"nodes", "links", "sources", "destinations", "flows", "cross_flows"},
+    "cross flow": {"name", "traffic", "route", "back", "dscp", "start_ns", "stop_ns"},
 }
-_KINDS = ("poisson", "cbr")
 
 
 def check_carried(spec: NetworkSpec) -> None:
@@ -33,43 +35,55 @@ def check_carried(spec: NetworkSpec) -> None:
     Whatever a specification says beyond what this engine knows is refused, not left out.
     """
     check_installed()
-    findings = list(_findings(spec))
+    findings = [f"network.engine ns3 {text}: use network.engine packet" for text in _findings(spec)]
     if findings:
         raise InputError(findings)
 
 
 def _findings(spec: NetworkSpec) -> Iterator[str]:
-    yield from _beyond("network", "", spec)
+    yield from _beyond("network", "this one", spec)
     for link in spec.links:
-        yield from _beyond("link", f" {link.a}-{link.b}", link)
+        name = f"{link.a}-{link.b}"
+        yield from _beyond("link", name, link)
+        if not isinstance(link.queue, DropTail):
+            kind = type(link.queue).__name__
+            yield f"has drop-tail queues alone, and link {name} has a {kind}"
     for source in spec.sources:
-        yield from _beyond("PMU", f" {source.name}", source)
+        yield from _beyond("PMU", source.name, source)
     for destination in spec.destinations:
-        yield from _beyond("controller", f" {destination.name}", destination)
-    for route in routes_of(spec):
-        if len(route) - 1 > MOST_HOPS:
-            yield (
-                f"network.engine ns3 carries packets over at most {MOST_HOPS} links"
-                f" (got {len(route) - 1} from {route[0]} to {route[-1]})"
-            )
+        yield from _beyond("controller", destination.name, destination)
     for number, flow in enumerate(spec.flows):
-        yield from _beyond("flow", f" {number}", flow)
+        yield from _beyond("flow", str(number), flow)
+        yield from _too_large(spec, f"flow {number}", flow.route, FRAME_BYTES)
     for cross in spec.cross_flows:
-        yield from _beyond("cross flow", f" {cross.name}", cross)
-        if cross.kind not in _KINDS:
-            yield f"network.engine ns3 knows {' and '.join(_KINDS)} traffic (got {cross.kind})"
-    if len(spec.destinations) > MOST_DESTINATIONS:
+        yield from _cross(spec, cross)
+    longest = max(routes_of(spec), key=len, default=())
+    if len(longest) - 1 > MOST_HOPS:
         yield (
-            f"network.engine ns3 serves at most {MOST_DESTINATIONS} controllers"
-            f" (got {len(spec.destinations)})"
+            f"carries packets over at most {MOST_HOPS} links, and there are {len(longest) - 1}"
+            f" from {longest[0]} to {longest[-1]}"
         )
+    if len(spec.destinations) > MOST_DESTINATIONS:
+        yield f"serves at most {MOST_DESTINATIONS} controllers (got {len(spec.destinations)})"
+
+
+def _cross(spec: NetworkSpec, cross: CrossFlow) -> Iterator[str]:
+    yield from _beyond("cross flow", cross.name, cross)
+    if isinstance(cross.traffic, Acknowledged | Answered):
+        kind = type(cross.traffic).__name__
+        yield f"has no traffic that waits for answers, and {cross.name} is {kind}"
+    yield from _too_large(spec, cross.name, cross.route, cross.traffic.payload_bytes)
 
 
 def _beyond(what: str, name: str, entry: Any) -> Iterator[str]:
     for field in fields(entry):
         default = None if field.default is MISSING else field.default
         if field.name not in _CARRIED[what] and getattr(entry, field.name) != default:
-            yield (
-                f"network.engine ns3 has no {field.name} of a {what}, which{name or ' this one'}"
-                " has: use network.engine packet"
-            )
+            yield f"has no {field.name} of a {what}, and {name} has it"
+
+
+def _too_large(spec: NetworkSpec, name: str, route: Route, payload_bytes: int) -> Iterator[str]:
+    size = payload_bytes + HEADER_BYTES
+    least = min((link.mtu_bytes for _, link in spec.hops(route)), default=size)
+    if size > least:
+        yield f"cuts no datagrams, and those of {name} have {size} bytes where the MTU is {least}"

@@ -68,6 +68,36 @@ class Supply
     size_t m_least;
 };
 
+// The losses of one direction of a link, as the packet engine takes them: gaps from one loss to the
+// next, in packets or in bits on the link.
+class Losses
+{
+  public:
+    Losses(Supply* gaps, bool is_per_bit)
+        : m_gaps(gaps),
+          m_is_per_bit(is_per_bit),
+          m_left(gaps->Take())
+    {
+    }
+
+    // Whether the link loses its next packet, of so many bytes.
+    bool Next(int64_t size_bytes)
+    {
+        m_left -= m_is_per_bit ? 8 * size_bytes : 1;
+        bool is_lost = m_left <= 0;
+        while (m_left <= 0)
+        {
+            m_left += m_gaps->Take();
+        }
+        return is_lost;
+    }
+
+  private:
+    Supply* m_gaps;
+    bool m_is_per_bit;
+    int64_t m_left;
+};
+
 // What becomes of the packets under way, by ns-3's number of each.
 class Ledger
 {
@@ -140,9 +170,11 @@ class LinkQueue : public ns3::DropTailQueue<ns3::Packet>
   public:
     static constexpr int64_t PPP_BYTES = 2;
 
-    LinkQueue(Ledger& ledger, ns3::DataRate rate, int64_t overhead_bytes)
+    // most_bytes: that may wait, besides the limit in packets, which ns-3 keeps.
+    LinkQueue(Ledger& ledger, ns3::DataRate rate, int64_t most_bytes, int64_t overhead_bytes)
         : m_ledger(ledger),
           m_rate(rate),
+          m_most_bytes(most_bytes),
           m_overhead_bytes(overhead_bytes)
     {
     }
@@ -159,7 +191,8 @@ class LinkQueue : public ns3::DropTailQueue<ns3::Packet>
             packet->RemoveAtStart(PPP_BYTES);
         }
         packet->AddPaddingAtEnd(m_overhead_bytes - (HasPpp() ? PPP_BYTES : 0));
-        if (!DropTailQueue::Enqueue(packet))
+        bool is_over = m_is_busy && GetNBytes() + packet->GetSize() > m_most_bytes;
+        if (is_over || !DropTailQueue::Enqueue(packet))
         {
             m_dropped_queue++;
             m_ledger.Close(packet->GetUid(), QUEUE_FULL);
@@ -201,38 +234,39 @@ class LinkQueue : public ns3::DropTailQueue<ns3::Packet>
   private:
     Ledger& m_ledger;
     ns3::DataRate m_rate;
+    int64_t m_most_bytes;
     int64_t m_overhead_bytes;
     bool m_is_busy = false;
     std::deque<uint64_t> m_places;
 };
 
-// The receiving end of a link: packets are lost as the supply says (1: lost).
+// The receiving end of a link, which throws away what the link has lost.
 class LinkErrors : public ns3::ErrorModel
 {
   public:
-    LinkErrors(Ledger& ledger, Ptr<LinkQueue> queue, Supply* losses)
+    LinkErrors(Ledger& ledger, Ptr<LinkQueue> queue, std::unique_ptr<Losses> losses)
         : m_ledger(ledger),
           m_queue(queue),
-          m_losses(losses)
+          m_losses(std::move(losses))
     {
     }
 
   private:
     bool DoCorrupt(Ptr<ns3::Packet> packet) override
     {
+        if (m_losses != nullptr && m_losses->Next(packet->GetSize()))
+        {
+            m_queue->m_dropped_loss++;
+            m_ledger.Close(packet->GetUid(), LOSS);
+            return true;
+        }
         if (!m_queue->HasPpp())
         {
             ns3::PppHeader header;
             header.SetProtocol(0x0021); // IPv4
             packet->AddHeader(header);
         }
-        if (m_losses == nullptr || m_losses->Take() == 0)
-        {
-            return false;
-        }
-        m_queue->m_dropped_loss++;
-        m_ledger.Close(packet->GetUid(), LOSS);
-        return true;
+        return false;
     }
 
     void DoReset() override
@@ -241,7 +275,7 @@ class LinkErrors : public ns3::ErrorModel
 
     Ledger& m_ledger;
     Ptr<LinkQueue> m_queue;
-    Supply* m_losses;
+    std::unique_ptr<Losses> m_losses;
 };
 
 } // namespace tieline

@@ -17,6 +17,7 @@ class Network : public Topology
     static constexpr uint16_t FIRST_PORT = 10000;
     static constexpr uint16_t DISCARD_PORT = 9;
     static constexpr int64_t CROSS = -1;
+    static constexpr int64_t UDP_BYTES = 8;
 
     // Args: nodes, how many; pmu_flows, whose numbers come before those of the cross flows.
     Network(int64_t nodes, int64_t pmu_flows)
@@ -38,16 +39,16 @@ class Network : public Topology
         return s_is_open;
     }
 
-    void AddSource(int64_t node)
+    void AddSource(int64_t node, uint8_t dscp)
     {
-        m_sources.push_back({OpenSocket(node), {}, m_nodes[node]->GetId()});
+        m_sources.push_back({OpenSocket(node, dscp), {}, m_nodes[node]->GetId()});
     }
 
     // A controller, or, with the number CROSS, what takes a node's cross traffic.
     void AddDestination(int64_t node, int64_t number)
     {
         m_receivers.push_back({this, number});
-        auto socket = OpenSocket(node);
+        auto socket = OpenSocket(node, 0);
         socket->Bind(ns3::InetSocketAddress(ns3::Ipv4Address::GetAny(), PortOf(number)));
         socket->SetRecvCallback(ns3::MakeCallback(&Receiver::Read, &m_receivers.back()));
     }
@@ -62,12 +63,19 @@ class Network : public Topology
     }
 
     // Cross traffic, which starts at once; all PMU flows stand before it.
-    void AddCross(int64_t node, int64_t payload_bytes, uint32_t address, int64_t gaps)
+    // sizes: supply of its datagrams' sizes with the UDP header, or -1: all have payload_bytes.
+    void AddCross(int64_t node,
+                  uint32_t address,
+                  uint8_t dscp,
+                  int64_t payload_bytes,
+                  int64_t sizes,
+                  int64_t gaps)
     {
         int64_t number = m_destinations.size() + m_crosses.size();
-        m_crosses.push_back({OpenSocket(node),
+        m_crosses.push_back({OpenSocket(node, dscp),
                              {number, ns3::InetSocketAddress(HostAddress(address), DISCARD_PORT)},
-                             static_cast<uint32_t>(payload_bytes),
+                             payload_bytes,
+                             sizes < 0 ? nullptr : &m_supplies[sizes],
                              &m_supplies[gaps]});
         Plan(&m_crosses.back(), m_nodes[node]->GetId());
     }
@@ -142,7 +150,8 @@ class Network : public Topology
         std::copy(m_ledger.m_cross_ended, m_ledger.m_cross_ended + 3, counts + 1);
     }
 
-    // Port by port: packets, bytes, dropped at the queue, lost, busy ns, most waiting.
+    // Port by port: packets, bytes, busy ns, dropped at the queue, lost on the link, lost with the
+    // link (none), waiting now, most waiting since the span began.
     void CopyPorts(int64_t* rows) const
     {
         for (const Port& port : m_ports)
@@ -151,10 +160,21 @@ class Network : public Topology
             int64_t ahead_ns = queue.m_free_at_ns - Simulator::Now().GetNanoSeconds();
             *rows++ = queue.m_carried_packets;
             *rows++ = queue.m_carried_bytes;
+            *rows++ = queue.m_busy_ns - std::max<int64_t>(0, ahead_ns);
             *rows++ = queue.m_dropped_queue;
             *rows++ = queue.m_dropped_loss;
-            *rows++ = queue.m_busy_ns - std::max<int64_t>(0, ahead_ns);
+            *rows++ = 0;
+            *rows++ = queue.GetNPackets();
             *rows++ = queue.m_most_waiting;
+        }
+    }
+
+    // Begin a new span for the most that wait at each port.
+    void BeginSpan()
+    {
+        for (Port& port : m_ports)
+        {
+            port.queue->m_most_waiting = port.queue->GetNPackets();
         }
     }
 
@@ -176,7 +196,8 @@ class Network : public Topology
     {
         Ptr<ns3::Socket> socket;
         Flow flow;
-        uint32_t payload_bytes;
+        int64_t payload_bytes;
+        Supply* sizes;
         Supply* gaps;
     };
 
@@ -199,12 +220,13 @@ class Network : public Topology
         return destination == CROSS ? DISCARD_PORT : FIRST_PORT + destination;
     }
 
-    Ptr<ns3::Socket> OpenSocket(int64_t node) const
+    Ptr<ns3::Socket> OpenSocket(int64_t node, uint8_t dscp) const
     {
         auto kind = ns3::UdpSocketFactory::GetTypeId();
         Ptr<ns3::Socket> socket = ns3::Socket::CreateSocket(m_nodes[node], kind);
         // ns-3 takes an address without a network for that network's broadcast address.
         socket->SetAllowBroadcast(true);
+        socket->SetIpTos(dscp << 2);
         return socket;
     }
 
@@ -223,7 +245,9 @@ class Network : public Topology
     void SendCross(Cross* cross)
     {
         m_cross_sent++;
-        auto packet = ns3::Create<ns3::Packet>(cross->payload_bytes);
+        bool is_sized = cross->sizes != nullptr;
+        int64_t bytes = is_sized ? cross->sizes->Take() - UDP_BYTES : cross->payload_bytes;
+        auto packet = ns3::Create<ns3::Packet>(static_cast<uint32_t>(bytes));
         Send(cross->socket, packet, cross->flow, {cross->flow.number, 0, nullptr});
         Plan(cross, Simulator::GetContext());
     }

@@ -67,15 +67,17 @@ class Topology
     }
 
     // Join two nodes; the port from a to b has an even number, the one back the next.
-    // loss_there, loss_back: supplies of losses, or -1 for none.
+    // loss_there, loss_back: supplies of gaps between losses, in packets or in bits; -1: none.
     void AddLink(int64_t a,
                  int64_t b,
                  uint64_t rate_bps,
                  int64_t propagation_ns,
-                 uint32_t queue,
+                 uint32_t queue_packets,
+                 int64_t queue_bytes,
                  int64_t overhead_bytes,
                  int64_t loss_there,
-                 int64_t loss_back)
+                 int64_t loss_back,
+                 bool is_per_bit)
     {
         auto channel = ns3::CreateObject<ns3::PointToPointChannel>();
         channel->SetAttribute("Delay", ns3::TimeValue(ns3::NanoSeconds(propagation_ns)));
@@ -83,8 +85,8 @@ class Topology
         for (int64_t node : {a, b})
         {
             auto device = ns3::CreateObject<ns3::PointToPointNetDevice>();
-            auto fifo = ns3::CreateObject<LinkQueue>(m_ledger, rate, overhead_bytes);
-            fifo->SetMaxSize(ns3::QueueSize(ns3::PACKETS, queue));
+            auto fifo = ns3::CreateObject<LinkQueue>(m_ledger, rate, queue_bytes, overhead_bytes);
+            fifo->SetMaxSize(ns3::QueueSize(ns3::PACKETS, queue_packets));
             device->SetDataRate(rate);
             device->SetMtu(65535); // nothing is fragmented
             device->SetQueue(fifo);
@@ -95,8 +97,8 @@ class Topology
         }
         Port& there = m_ports[m_ports.size() - 2];
         Port& back = m_ports[m_ports.size() - 1];
-        Damage(back.device, there.queue, loss_there);
-        Damage(there.device, back.queue, loss_back);
+        Damage(back.device, there.queue, loss_there, is_per_bit);
+        Damage(there.device, back.queue, loss_back, is_per_bit);
     }
 
     // Give a node the address of this number, besides those of its links.
@@ -156,13 +158,22 @@ class Topology
         return ns3::DynamicCast<ns3::Ipv4StaticRouting>(protocol);
     }
 
-    void Damage(Ptr<ns3::PointToPointNetDevice> device, Ptr<LinkQueue> queue, int64_t losses)
+    void Damage(Ptr<ns3::PointToPointNetDevice> device,
+                Ptr<LinkQueue> queue,
+                int64_t gaps,
+                bool is_per_bit)
     {
-        if (losses >= 0 || !queue->HasPpp())
+        if (gaps < 0 && queue->HasPpp())
         {
-            Supply* supply = losses < 0 ? nullptr : &m_supplies[losses];
-            device->SetReceiveErrorModel(ns3::CreateObject<LinkErrors>(m_ledger, queue, supply));
+            return;
         }
+        std::unique_ptr<Losses> losses;
+        if (gaps >= 0)
+        {
+            losses = std::make_unique<Losses>(&m_supplies[gaps], is_per_bit);
+        }
+        device->SetReceiveErrorModel(
+            ns3::CreateObject<LinkErrors>(m_ledger, queue, std::move(losses)));
     }
 
     void DroppedByIp(const ns3::Ipv4Header&,

@@ -1,134 +1,195 @@
 """Lays a `NetworkSpec` out in the kernel's memory and opens a stream for each random thing."""
 
-from collections.abc import Iterable, Mapping
-from itertools import chain
+from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tieline.errors import InputError
-from tieline.network.jitter import Jitter
-from tieline.network.packet.draws import Chunks, gaps, jitters, losses, trace_gaps
+from tieline.network.draws import CHUNK
+from tieline.network.losses import Loss
+from tieline.network.packet import tcp
+from tieline.network.packet.changes import Changes
+from tieline.network.packet.draws import gaps, sizes, uniforms
 from tieline.network.packet.memory import (
+    ARRIVED,
     COLUMNS,
-    DRAWS_CHUNK,
+    CONNECTION_COLUMNS,
+    END_CLASSES,
+    EVENT_STREAM,
+    FIRST_CLASS,
+    FIRST_COME,
     FIRST_DRAW,
-    FREE_AT,
     GAP_STREAM,
-    NO_PORT,
-    NO_STREAM,
+    HAS_BYTES,
+    HAS_JITTER,
+    HAS_LOSS,
+    HAS_RED,
+    HAS_SERVER,
+    HAS_TAP,
+    JITTER_STREAM,
+    LOSS_LEFT,
+    LOSS_STREAM,
+    LOSS_UNIT,
+    NONE,
+    OVERHEAD,
+    PEER,
+    PER_BIT,
+    PER_PACKET,
+    PRIORITY,
+    PROPAGATION,
+    QUEUE,
+    QUEUE_BYTES,
+    RATE,
+    RED,
+    REPLY,
+    RING,
+    ROUND_ROBIN,
+    SERVICE_ORDER,
+    SIZE_STREAM,
+    SPECIAL,
+    THINK,
+    TURN,
+    USED,
     Cells,
     Memory,
 )
-from tieline.network.spec import FRAME_BYTES, NetworkSpec, packet_bytes, service_ns
-
-Traces = Mapping[str, NDArray[np.int64]]
+from tieline.network.packet.red import CERTAIN, ONE_PACKET
+from tieline.network.packet.routes import FRAME_WINDOW, Routes
+from tieline.network.packet.supplies import Supplies
+from tieline.network.queues.base import NO_LIMIT, EarlyDetection
+from tieline.network.spec import Link, NetworkSpec
+from tieline.network.traffic.base import Acknowledged, Answered
+from tieline.streams import stream
 
 _FIRST_CAPACITY = 4096
+_ORDERS = {"first_come": FIRST_COME, "priority": PRIORITY, "round_robin": ROUND_ROBIN}
+LEAST_WAIT_NS = 200_000_000
+"""Least retransmission time of Linux; RFC 6298 would have a second."""
 
 
-class Supplies:
-    """The random streams of a network, numbered as they are opened."""
-
-    def __init__(self, seed: int) -> None:
-        self.seed = seed
-        self.chunks: list[Chunks] = []
-
-    def open(self, chunks: Chunks) -> int:
-        """Return the number of a new stream."""
-        self.chunks.append(chunks)
-        return len(self.chunks) - 1
-
-    def loss(self, name: str, probability: float) -> int:
-        """Return the stream of a link's losses, or `NO_STREAM` if it loses nothing."""
-        if probability == 0:
-            return NO_STREAM
-        return self.open(losses(self.seed, f"loss of {name}", probability))
-
-    def jitter(self, name: str, jitter: Jitter | None) -> int:
-        """Return the stream of a jitter, or `NO_STREAM` if there is none."""
-        return NO_STREAM if jitter is None else self.open(jitters(self.seed, name, jitter))
-
-    def first_draws(self) -> Cells:
-        """Return the table of streams with two chunks of each."""
-        table = np.zeros((len(self.chunks), COLUMNS["streams"]), dtype=np.int64)
-        for row, chunks in zip(table, self.chunks, strict=True):
-            row[FIRST_DRAW:] = np.concatenate([next(chunks), next(chunks)])
-        return table
-
-
-def laid_out(spec: NetworkSpec, supplies: Supplies, traces: Traces) -> Memory:
-    """Return the memory before the first event.
+def laid_out(spec: NetworkSpec, supplies: Supplies) -> tuple[Memory, Changes]:
+    """Return the memory before the first event, and what will be changed in it.
 
     Raises:
-        InputError: one source has more flows than a chunk of random numbers.
+        InputError: one source has more flows than a chunk of random numbers, or a link's MTU does
+            not hold a header and eight bytes.
     """
-    sources = _sources(spec)
-    most = int((sources[:, 1] - sources[:, 0]).max(initial=1))
-    if most > DRAWS_CHUNK:
-        raise InputError(f"the packet engine carries at most {DRAWS_CHUNK} flows a source")
-    flows, hops = _flows_and_hops(spec)
+    routes = Routes(spec)
+    ports = _Ports(spec, supplies)
+    connections, received = _connections(routes)
     tables = {
-        "ports": _ports(spec, supplies),
-        "hops": hops,
-        "flows": flows,
-        "sources": sources,
+        "ports": ports.table,
+        "classes": _table("classes", ports.classes),
+        "red": _table("red", ports.red),
+        "hops": _table("hops", routes.hops),
+        "forks": _table("forks", ((fork,) for fork in routes.forks)),
+        "members": _table("members", ((flow,) for flow in routes.members)),
+        "flows": _table("flows", routes.flows),
+        "sources": _table("sources", routes.sources),
         "destinations": _destinations(spec, supplies),
-        "cross": _cross(spec, supplies, traces),
-        "ring": np.zeros((2 * sum(link.queue_packets for link in spec.links), 1), dtype=np.int64),
+        "cross": _cross(spec, supplies, routes),
+        "connections": connections,
+        "received": received,
+        "ring": np.zeros((ports.ring, COLUMNS["ring"]), dtype=np.int64),
     }
+    changes = Changes(spec, supplies, routes)
     tables["streams"] = supplies.first_draws()
+    _look_ahead(tables["ports"], tables["streams"])
+    most = _most_packets(spec, routes)
+    if most > CHUNK:
+        raise InputError(f"the packet engine makes at most {CHUNK} packets at once ({most} asked)")
     bounds = {
         "source_count": len(spec.sources),
         "pmu_flows": len(spec.flows),
-        "cross_flows": len(spec.cross_flows),
+        "first_tree": routes.first_tree,
         "most_packets": most,
     }
-    return Memory(tables, _FIRST_CAPACITY + 4 * most, bounds)
+    return Memory(tables, _FIRST_CAPACITY + 4 * most, bounds), changes
 
 
-def _sources(spec: NetworkSpec) -> Cells:
-    sources = [flow.source for flow in spec.flows]
-    edges = np.searchsorted(sources, np.arange(len(spec.sources) + 1))
-    return np.stack([edges[:-1], edges[1:]], axis=1).astype(np.int64)
+def _most_packets(spec: NetworkSpec, routes: Routes) -> int:
+    """Return the most packets, or records, that one event makes."""
+    by_source = np.bincount([flow.source for flow in spec.flows], minlength=1).max()
+    windows = [
+        flow.traffic.window_segments
+        for flow in spec.cross_flows
+        if isinstance(flow.traffic, Acknowledged)
+    ]
+    if spec.transport == "tcp" and spec.flows:
+        windows.append(FRAME_WINDOW)
+    return 2 + max(int(by_source), routes.most_pieces, *windows, 0)
 
 
-def _flows_and_hops(spec: NetworkSpec) -> tuple[Cells, Cells]:
-    plans = chain(
-        ((flow.route, FRAME_BYTES, flow.destination) for flow in spec.flows),
-        ((cross.route, cross.payload_bytes, -1) for cross in spec.cross_flows),
-    )
-    flows: list[tuple[int, int]] = []
-    hops: list[tuple[int, int, int]] = []
-    for route, payload_bytes, destination in plans:
-        flows.append((len(hops), destination))
-        hops += [
-            (port, service_ns(link, payload_bytes), packet_bytes(link, payload_bytes))
-            for port, link in spec.hops(route)
-        ]
-        hops.append((NO_PORT, 0, 0))
-    return _table("flows", flows), _table("hops", hops)
+class _Ports:
+    """The table of ports, with the rows of classes and of early detection that they need."""
 
-
-def _ports(spec: NetworkSpec, supplies: Supplies) -> Cells:
-    facts = []
-    ring = 0
-    for (origin, target), port in spec.ports.items():
-        link = spec.links[port // 2]
-        name = f"{origin}->{target}"
-        facts.append(
-            (
+    def __init__(self, spec: NetworkSpec, supplies: Supplies) -> None:
+        self.table = np.zeros((2 * len(spec.links), COLUMNS["ports"]), dtype=np.int64)
+        self.classes: list[tuple[int, ...]] = []
+        self.red: list[tuple[int, ...]] = []
+        self.ring = 0
+        self._supplies = supplies
+        for (origin, target), number in spec.ports.items():
+            link = spec.links[number // 2]
+            row = self.table[number]
+            row[[LOSS_STREAM, EVENT_STREAM, JITTER_STREAM, RED, PEER]] = NONE
+            row[PROPAGATION], row[RATE], row[OVERHEAD] = (
                 link.propagation_ns,
-                link.queue_packets,
-                ring,
-                supplies.loss(name, link.loss_probability),
-                supplies.jitter(f"jitter of {name}", link.jitter),
+                link.rate_bps,
+                link.overhead_bytes,
             )
-        )
-        ring += link.queue_packets
-    table = np.zeros((len(facts), COLUMNS["ports"]), dtype=np.int64)
-    table[:, :FREE_AT] = np.array(facts, dtype=np.int64).reshape(-1, FREE_AT)
-    return table
+            if link.is_half_duplex:
+                row[PEER] = number ^ 1
+            if number // 2 in spec.taps:
+                row[SPECIAL] |= HAS_TAP
+            self._queue(row, link, f"{origin}->{target}")
+            self._losses(row, link.loss, f"{origin}->{target}")
+            if link.jitter is not None:
+                row[SPECIAL] |= HAS_JITTER
+                row[JITTER_STREAM] = supplies.jitter(f"jitter of {origin}->{target}", link.jitter)
+
+    def _queue(self, row: Cells, link: Link, name: str) -> None:
+        lines = link.queue.lines
+        if len(lines) > 1 or link.is_half_duplex:
+            row[SPECIAL] |= HAS_SERVER
+            row[SERVICE_ORDER] = _ORDERS[link.queue.order]
+            row[FIRST_CLASS] = row[TURN] = len(self.classes)
+            self.classes += [
+                (line.packets, line.bytes, line.quantum_bytes, 0, 0, 0, 0, 0) for line in lines
+            ]
+            row[END_CLASSES] = len(self.classes)
+            return
+        row[QUEUE], row[RING] = lines[0].packets, self.ring
+        self.ring += lines[0].packets
+        if lines[0].bytes < NO_LIMIT:
+            row[SPECIAL] |= HAS_BYTES
+            row[QUEUE_BYTES] = lines[0].bytes
+        if link.queue.early_detection is not None:
+            row[SPECIAL] |= HAS_RED
+            row[RED] = len(self.red)
+            draws = self._supplies.open(uniforms(self._supplies.seed, f"early drops of {name}"))
+            self.red.append(_red(link.queue.early_detection, draws))
+
+    def _losses(self, row: Cells, loss: Loss | None, name: str) -> None:
+        if loss is None:
+            return
+        row[SPECIAL] |= HAS_LOSS
+        row[LOSS_UNIT] = PER_BIT if loss.counts == "bits" else PER_PACKET
+        generator = stream(self._supplies.seed, f"loss of {name}")
+        row[LOSS_STREAM] = self._supplies.open(loss.gaps(generator))
+
+
+def _red(early: EarlyDetection, draws: int) -> tuple[int, ...]:
+    low, high = round(early.low * ONE_PACKET), round(early.high * ONE_PACKET)
+    return low, high, round(early.probability * CERTAIN), early.weight_shift, draws, 0, -1
+
+
+def _look_ahead(ports: Cells, streams: Cells) -> None:
+    """Take the first gap of every stream of losses."""
+    lossy = np.flatnonzero(ports[:, LOSS_STREAM] != NONE)
+    numbers = ports[lossy, LOSS_STREAM]
+    ports[lossy, LOSS_LEFT] = streams[numbers, FIRST_DRAW]
+    streams[numbers, USED] = 1
 
 
 def _destinations(spec: NetworkSpec, supplies: Supplies) -> Cells:
@@ -141,14 +202,43 @@ def _destinations(spec: NetworkSpec, supplies: Supplies) -> Cells:
     )
 
 
-def _cross(spec: NetworkSpec, supplies: Supplies, traces: Traces) -> Cells:
-    table = np.zeros((len(spec.cross_flows), COLUMNS["cross"]), dtype=np.int64)
-    for row, flow in zip(table, spec.cross_flows, strict=True):
-        is_traced = flow.name in traces
-        chunks = trace_gaps(traces[flow.name]) if is_traced else gaps(supplies.seed, flow)
-        row[GAP_STREAM] = supplies.open(chunks)
+def _cross(spec: NetworkSpec, supplies: Supplies, routes: Routes) -> Cells:
+    table = np.zeros((routes.first_tree - len(spec.flows), COLUMNS["cross"]), dtype=np.int64)
+    table[:, [GAP_STREAM, SIZE_STREAM, REPLY]] = NONE
+    table[:, ARRIVED:] = 0
+    for number, (row, flow) in enumerate(zip(table, spec.cross_flows, strict=False)):
+        row[GAP_STREAM] = supplies.open(gaps(supplies.seed, flow))
+        own_sizes = sizes(flow)
+        if own_sizes is not None:
+            row[SIZE_STREAM] = supplies.open(own_sizes)
+        if isinstance(flow.traffic, Answered):
+            row[REPLY] = routes.back_of[len(spec.flows) + number]
+            row[THINK] = flow.traffic.think_ns
     return table
 
 
+def _connections(routes: Routes) -> tuple[Cells, Cells]:
+    """Return the tables of connections and of the segments that they have received."""
+    table = np.zeros((len(routes.connections), CONNECTION_COLUMNS), dtype=np.int64)
+    received = 0
+    for row, connection in zip(table, routes.connections, strict=True):
+        row[tcp.DATA_FLOW] = connection.data_flow
+        row[tcp.ACK_FLOW] = connection.ack_flow
+        row[tcp.FRAMES_OF] = connection.frames_of
+        row[tcp.MOST] = connection.window
+        row[tcp.RECEIVED] = received
+        row[tcp.LEAST_WAIT] = LEAST_WAIT_NS
+        row[tcp.WINDOW] = tcp.FIRST_WINDOW
+        row[tcp.THRESHOLD] = connection.window * tcp.UNIT
+        row[tcp.WAIT] = tcp.FIRST_WAIT_NS
+        row[[tcp.RECOVER, tcp.TIMED_SEGMENT]] = NONE
+        received += connection.window
+    return table, np.zeros((received, COLUMNS["received"]), dtype=np.int64)
+
+
 def _table(name: str, rows: Iterable[tuple[int, ...]]) -> Cells:
-    return np.array(list(rows), dtype=np.int64).reshape(-1, COLUMNS[name])
+    listed = list(rows)
+    table = np.zeros((len(listed), COLUMNS[name]), dtype=np.int64)
+    if listed:
+        table[:, : len(listed[0])] = listed
+    return table

@@ -1,62 +1,55 @@
-"""Endless supplies of whole random numbers, one for each random thing of a network."""
-
-from collections.abc import Iterator
+"""The random numbers that the kernel takes, one endless supply for each random thing."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tieline.network.draws import CHUNK, NEVER, Chunks, chunked
 from tieline.network.jitter import Jitter
-from tieline.network.packet.memory import DRAWS_CHUNK
+from tieline.network.packet.red import CERTAIN
 from tieline.network.spec import CrossFlow
+from tieline.network.traffic.base import UDP_HEADER, Acknowledged, Sized
 from tieline.streams import stream
 
-Chunks = Iterator[NDArray[np.int64]]
-
-NEVER_NS = 1 << 60
-"""A gap of 36 years: what follows the last packet of a trace."""
-
-
-def losses(seed: int, name: str, probability: float) -> Chunks:
-    """Yield chunks of 0 (kept) and 1 (lost), independent, 1 with the given probability."""
-    generator = stream(seed, name)
-    while True:
-        yield (generator.random(DRAWS_CHUNK) < probability).astype(np.int64)
+_LONG_NS = 1 << 47
+"""A gap of 39 hours; longer ones count as this, so that a chunk of them still has a sum."""
 
 
 def jitters(seed: int, name: str, jitter: Jitter) -> Chunks:
     """Yield chunks of delays of a distribution, in nanoseconds."""
     generator = stream(seed, name)
     while True:
-        yield jitter.draw(generator, DRAWS_CHUNK)
+        yield jitter.draw(generator, CHUNK)
+
+
+def uniforms(seed: int, name: str) -> Chunks:
+    """Yield chunks of whole numbers, equally likely from 0 to 2^30 - 1."""
+    generator = stream(seed, name)
+    while True:
+        yield generator.integers(CERTAIN, size=CHUNK, dtype=np.int64)
 
 
 def gaps(seed: int, flow: CrossFlow) -> Chunks:
-    """Yield chunks of the times between a cross flow's packets, the first counted from zero.
+    """Yield chunks of the times between a cross flow's datagrams, the first counted from zero.
 
-    CBR keeps its mean rate exactly: the instants, not the gaps, are rounded to whole nanoseconds.
+    A connection has two: when it begins and, after that, when it ends.
     """
-    generator = stream(seed, f"arrivals of {flow.name}")
-    if flow.kind == "poisson":
-        while True:
-            exponential = generator.standard_exponential(DRAWS_CHUNK) * flow.gap_ns
-            yield np.rint(exponential).astype(np.int64)
-    phase = generator.random()
-    last_ns = 0
-    count = 0
-    while True:
-        instants = np.rint((phase + count + np.arange(DRAWS_CHUNK)) * flow.gap_ns).astype(np.int64)
-        yield np.diff(instants, prepend=last_ns)
-        last_ns = int(instants[-1])
-        count += DRAWS_CHUNK
+    now_ns = flow.start_ns
+    if isinstance(flow.traffic, Acknowledged):
+        stop_ns = now_ns + NEVER if flow.stop_ns is None else flow.stop_ns
+        yield from chunked([np.array([now_ns, stop_ns - now_ns])], NEVER)
+    is_first = True
+    for chunk in flow.traffic.gaps(stream(seed, f"arrivals of {flow.name}")):
+        instants = now_ns + np.cumsum(np.minimum(chunk, _LONG_NS))
+        shifted = chunk.copy()
+        if is_first:
+            shifted[0] = min(shifted[0], _LONG_NS) + flow.start_ns
+        if flow.stop_ns is not None:
+            shifted[instants >= flow.stop_ns] = NEVER
+        now_ns, is_first = min(int(instants[-1]), NEVER), False
+        yield shifted
 
 
-def trace_gaps(times_ns: NDArray[np.int64]) -> Chunks:
-    """Yield the gaps between given ascending instants, then gaps that never end."""
-    all_gaps = np.diff(times_ns, prepend=0)
-    for start in range(0, len(all_gaps), DRAWS_CHUNK):
-        chunk = np.full(DRAWS_CHUNK, NEVER_NS)
-        part = all_gaps[start : start + DRAWS_CHUNK]
-        chunk[: len(part)] = part
-        yield chunk
-    while True:
-        yield np.full(DRAWS_CHUNK, NEVER_NS)
+def sizes(flow: CrossFlow) -> Chunks | None:
+    """Return chunks of the datagrams' sizes, UDP header included; None if all are alike."""
+    if not isinstance(flow.traffic, Sized):
+        return None
+    return (chunk + UDP_HEADER for chunk in flow.traffic.sizes())

@@ -1,7 +1,5 @@
 """From bare records of ended packets to arrivals and drops, for engines that make such records."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +12,7 @@ from tieline.network.engine import (
     in_order,
 )
 from tieline.network.packet.memory import END_FLOW, END_HOW, END_SEQUENCE, END_TIME
-from tieline.network.spec import Flow
+from tieline.network.spec import NetworkSpec
 
 
 class Endings:
@@ -23,23 +21,28 @@ class Endings:
     A packet that has come, but that its controller is still processing, is held.
 
     Args:
-        flows: the PMU flows.
+        spec: the network.
 
     Attributes:
-        counts: (3,) PMU packets delivered, dropped at queues, lost on links.
+        counts: (4,) PMU packets by how they ended, as in `network/engine.py`.
     """
 
-    def __init__(self, flows: Sequence[Flow]) -> None:
+    def __init__(self, spec: NetworkSpec) -> None:
+        self._sources = len(spec.sources)
         self._ends = np.array(
-            [(flow.source, flow.destination) for flow in flows], dtype=np.int64
+            [(flow.source, flow.destination) for flow in spec.flows], dtype=np.int64
         ).reshape(-1, 2)
         self._held = NO_ARRIVALS
-        self.counts = np.zeros(3, dtype=np.int64)
+        self.counts = np.zeros(4, dtype=np.int64)
 
     @property
     def held(self) -> int:
         """Packets that have come and that their controller cannot use yet."""
         return len(self._held)
+
+    def flows_of_sources(self) -> NDArray[np.int64]:
+        """Return (sources,) how many flows each source has."""
+        return np.bincount(self._ends[:, 0], minlength=self._sources)
 
     def outcome(self, rows: NDArray[np.int64], until_ns: int) -> Outcome:
         """Return the drops, and the arrivals up to and including `until_ns`.
@@ -56,7 +59,7 @@ class Endings:
         self._held = self._held[~is_due]
         drops = self._records(rows[~is_delivered], DROP)
         drops["reason"] = rows[~is_delivered, END_HOW]
-        self.counts += np.bincount(drops["reason"], minlength=3)
+        self.counts += np.bincount(drops["reason"], minlength=4)
         self.counts[DELIVERED] += len(arrivals)
         return Outcome(arrivals, drops)
 

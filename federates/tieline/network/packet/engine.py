@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from tieline.errors import CosimError
 from tieline.network.engine import (
     DELIVERED,
+    LINK_DOWN,
     LOSS,
     QUEUE_FULL,
     Counts,
@@ -13,65 +14,87 @@ from tieline.network.engine import (
     Outcome,
     check_not_late,
 )
-from tieline.network.packet import kernel
-from tieline.network.packet.build import Supplies, Traces, laid_out
+from tieline.network.packet import kernel, tcp
+from tieline.network.packet.build import Supplies, laid_out
+from tieline.network.packet.counters import read_counters
 from tieline.network.packet.endings import Endings
+from tieline.network.packet.events import CROSS, FRAME, KINDS
 from tieline.network.packet.memory import (
     ARRIVED,
     BUSY,
     BYTES,
-    DRAWS_CHUNK,
+    CHUNK,
+    DOWN_DROPS,
+    END_MEMBERS,
     ENDED,
     FIRST_DRAW,
+    FIRST_MEMBER,
+    FLOW,
     FREE_AT,
     FREE_PACKETS,
     GAP_STREAM,
     HEAP_SIZE,
+    HOP,
     ITEM,
     LOSS_DROPS,
     MAX_QUEUE,
+    NONE,
     PACKETS,
     QUEUE_DROPS,
     SENT,
+    TAP_PORT,
+    TAP_TIME,
+    TAPPED,
     USED,
     WANTS_DRAWS,
 )
 from tieline.network.packet.pmu import Pmu
 from tieline.network.spec import NetworkSpec
 
+TAP = np.dtype(
+    [
+        ("sent_ns", "<i8"),
+        ("port", "<i4"),
+        ("flow", "<i4"),
+        ("sequence", "<i4"),
+        ("hop", "<i4"),
+        ("bytes", "<i4"),
+    ]
+)
+"""A packet on a link that is listened to: when its first bit left, the direction, its flow (PMU
+flows first, then the others), the number of its frame or segment, and its IP bytes."""
+
 
 class PacketEngine:
     """Carries frames through a `NetworkSpec`, packet by packet.
 
-    Not modelled: routers' own processing, fragmentation, address resolution, routing protocols (the
-    routes stand from the start). A controller's processing time delays each packet by itself; the
+    Not modelled: address resolution, the messages of routing protocols. Datagrams are cut to the
+    smallest MTU of their route where they enter it. A packet keeps the route that it entered with,
+    as on a label-switched path. A controller's processing time delays each packet by itself; the
     packets do not queue for the controller. A PMU sends its frames in order, so one whose jitter
     would overtake the last waits for it.
 
     Args:
         spec: the network.
         seed: the experiment's seed; each random thing has its own stream of it.
-        traces: instants (ns, ascending) at which a cross flow sends, by the flow's name, in place
-            of its random arrivals.
 
     Raises:
-        InputError: one source has more flows than a chunk of random numbers.
+        InputError: as `laid_out`.
     """
 
-    def __init__(self, spec: NetworkSpec, seed: int, traces: Traces | None = None) -> None:
+    def __init__(self, spec: NetworkSpec, seed: int) -> None:
         self._spec = spec
         self._supplies = Supplies(seed)
-        self._memory = laid_out(spec, self._supplies, traces or {})
+        self._memory, self._changes = laid_out(spec, self._supplies)
         self._pmus = [Pmu(source, seed) for source in spec.sources]
-        self._endings = Endings(spec.flows)
-        self._flows_of = np.bincount(
-            np.array([flow.source for flow in spec.flows], dtype=np.int64),
-            minlength=len(spec.sources),
-        )
+        self._endings = Endings(spec)
+        self._flows_of = self._endings.flows_of_sources()
         self.lookahead_ns = spec.lookahead_ns
         self._now_ns = -1
         self._rows: list[NDArray[np.int64]] = []
         self._sent = 0
+        self._tapped: list[NDArray[np.int64]] = []
+        self._max_queue = np.zeros(len(spec.ports), dtype=np.int64)
         self._start_cross_flows()
 
     def send(
@@ -81,14 +104,14 @@ class PacketEngine:
         sequence: int,
         payloads: NDArray[np.uint8] | None = None,
     ) -> None:
-        """Take the frames that some sources measured at one instant; it carries no bytes.
+        """Take the frames that some sources measured at one instant; their bytes stay here.
 
         Raises:
             CosimError: the last `run_until` has passed the instant at which a frame may enter.
         """
         check_not_late(measured_ns + self.lookahead_ns, self._now_ns)
         ready = [self._pmus[source].ready_ns(measured_ns) for source in sources]
-        items = -1 - len(self._spec.cross_flows) - (sequence * len(self._pmus) + sources)
+        items = KINDS * (sequence * len(self._pmus) + sources) + FRAME
         self._announce(np.array(ready, dtype=np.int64), items, kernel.FRAME_ORDER)
         self._sent += int(self._flows_of[sources].sum())
 
@@ -100,32 +123,37 @@ class PacketEngine:
         """
         if until_ns < self._now_ns:
             raise CosimError(f"the network cannot go back from {self._now_ns} to {until_ns} ns")
+        while self._changes.next_ns <= until_ns:
+            self._run_to(self._changes.next_ns - 1)
+            self._change()
+        self._run_to(until_ns)
         self._now_ns = until_ns
-        while (stop := self._run()) != kernel.DONE:
-            if stop == kernel.NEEDS_DRAWS:
-                self._refill()
-            elif not kernel.has_room(self._memory.cells, self._memory.layout):
-                self._memory.grow()
         outcome = self._endings.outcome(np.concatenate(self._rows), until_ns)
         self._rows.clear()
         self.counts().check(until_ns)
         return outcome
 
     def counts(self) -> Counts:
-        """Return the counts of PMU and cross packets at the instant of the last `run_until`."""
+        """Return the counts of PMU and cross packets at the instant of the last `run_until`.
+
+        A multicast packet counts once for each controller that it is still to reach, a frame on a
+        connection from the hand-over to its delivery, besides the segments that carry it.
+        """
         cross = self._memory.table("cross").sum(axis=0)
-        inside = self._memory.layout.capacity - int(self._memory.control[FREE_PACKETS])
+        ended = self._endings.counts + cross[ARRIVED:]
         return Counts(
             sent=self._sent + int(cross[SENT]),
-            delivered=int(self._endings.counts[DELIVERED] + cross[ARRIVED + DELIVERED]),
-            dropped_queue=int(self._endings.counts[QUEUE_FULL] + cross[ARRIVED + QUEUE_FULL]),
-            dropped_loss=int(self._endings.counts[LOSS] + cross[ARRIVED + LOSS]),
-            in_flight=inside + self._endings.held + self._packets_announced(),
+            delivered=int(ended[DELIVERED]),
+            dropped_queue=int(ended[QUEUE_FULL]),
+            dropped_loss=int(ended[LOSS]),
+            dropped_down=int(ended[LINK_DOWN]),
+            in_flight=self._inside() + self._endings.held + self._frames_waiting(),
         )
 
     def links(self) -> list[LinkUse]:
         """Return what each link carried up to the last `run_until`, direction by direction."""
         rows = self._memory.table("ports").tolist()
+        before = self._max_queue.tolist()
         return [
             LinkUse(
                 origin,
@@ -136,52 +164,123 @@ class PacketEngine:
                 dropped_queue=rows[port][QUEUE_DROPS],
                 dropped_loss=rows[port][LOSS_DROPS],
                 busy_ns=rows[port][BUSY] - max(0, rows[port][FREE_AT] - self._now_ns),
-                max_queue=rows[port][MAX_QUEUE],
+                max_queue=max(before[port], rows[port][MAX_QUEUE]),
+                dropped_down=rows[port][DOWN_DROPS],
             )
             for (origin, target), port in self._spec.ports.items()
         ]
 
+    def tapped(self) -> NDArray[np.void]:
+        """Return the packets of tapped links whose first bit has left since the last call.
+
+        Returns:
+            (n,) of `TAP`, in order of time.
+        """
+        rows = np.concatenate([*self._tapped, np.empty((0, 6), np.int64)])
+        is_due = rows[:, TAP_TIME] <= self._now_ns
+        self._tapped = [rows[~is_due]]
+        due = rows[is_due]
+        due = due[np.argsort(due[:, TAP_TIME], kind="stable")]
+        records = np.empty(len(due), TAP)
+        for column, name in enumerate(TAP.names or ()):
+            records[name] = due[:, column]
+        return records
+
+    def link_counters(self) -> NDArray[np.void]:
+        """Return the counters of each link's directions, and begin a new span for `max_queue`."""
+        ports = self._memory.table("ports")
+        memory = self._memory
+        counters = read_counters(self._now_ns, len(ports), memory.cells, memory.layout)
+        np.maximum(self._max_queue, counters["max_queue"], out=self._max_queue)
+        ports[:, MAX_QUEUE] = counters["queue"]
+        return counters
+
     def close(self) -> None:
-        """Do nothing: it holds nothing outside Python."""
+        """Do nothing: there is nothing to let go of."""
 
     def _start_cross_flows(self) -> None:
         """Announce the first packet of each cross flow."""
         streams = self._memory.table("streams")
         own = self._memory.table("cross")[:, GAP_STREAM]
-        items = -1 - np.arange(len(own), dtype=np.int64)
+        own = own[own != NONE]
+        items = KINDS * np.arange(len(own), dtype=np.int64) + CROSS
         self._announce(streams[own, FIRST_DRAW], items, base_order=0)
         streams[own, USED] = 1
         # Compiles, where that is still to be done, before the federation waits for an answer.
-        self._run()
+        self._run(-1)
+
+    def _change(self) -> None:
+        """Do the next change of the network."""
+        at_ns = self._changes.next_ns
+        while (
+            len(self._memory.inside()) * self._memory.layout.most_packets
+            > self._memory.layout.capacity
+        ):
+            self._memory.grow()
+        down = list(self._changes.apply(self._memory))
+        self._collect()
+        # What waited at a link that went down has not gone on it.
+        for place, rows in enumerate(self._tapped):
+            never = (rows[:, TAP_TIME] >= at_ns) & np.isin(rows[:, TAP_PORT], down)
+            self._tapped[place] = rows[~never]
 
     def _announce(
         self, times_ns: NDArray[np.int64], items: NDArray[np.int64], base_order: int
     ) -> None:
-        while self._memory.control[HEAP_SIZE] + len(items) > self._memory.layout.capacity:
+        while (
+            self._memory.control[HEAP_SIZE] + 2 * self._memory.layout.most_packets + len(items)
+            > self._memory.layout.capacity
+        ):
             self._memory.grow()
         kernel.announce(times_ns, items, base_order, self._memory.cells, self._memory.layout)
 
-    def _packets_announced(self) -> int:
-        """Return the packets of the frames that have not left their PMU, counted in the heap."""
-        items = self._memory.table("heap")[: self._memory.control[HEAP_SIZE], ITEM]
-        cross_flows = len(self._spec.cross_flows)
-        codes = -1 - cross_flows - items[items < -cross_flows]
-        return int(self._flows_of[codes % len(self._pmus)].sum())
+    def _inside(self) -> int:
+        """Return the packets inside, each member of a tree counted."""
+        layout = self._memory.layout
+        if layout.first_tree == len(self._memory.table("flows")):
+            return layout.capacity - int(self._memory.control[FREE_PACKETS])
+        packets = self._memory.table("packets")[self._memory.inside()]
+        hops = self._memory.table("hops")[packets[:, HOP]]
+        members = hops[:, END_MEMBERS] - hops[:, FIRST_MEMBER]
+        return int(np.where(packets[:, FLOW] < layout.first_tree, 1, members).sum())
 
-    def _run(self) -> int:
-        """Run the kernel as far as it comes, and take over its records of ended packets."""
-        stop = kernel.run(self._now_ns, self._memory.cells, self._memory.layout)
-        count = self._memory.control[ENDED]
-        self._rows.append(self._memory.table("ended")[:count].copy())
-        self._memory.control[ENDED] = 0
+    def _frames_waiting(self) -> int:
+        """Return the frames that are still at their PMU, or on a connection."""
+        items = self._memory.events()[:, ITEM]
+        codes = items[items % KINDS == FRAME] // KINDS
+        waiting = int(self._flows_of[codes % len(self._pmus)].sum()) if len(codes) else 0
+        connections = self._memory.table("connections")
+        connections = connections[connections[:, tcp.FRAMES_OF] != NONE]
+        under_way = connections[:, tcp.AVAILABLE] - connections[:, tcp.EXPECTED]
+        return waiting + int(under_way.sum())
+
+    def _run_to(self, until_ns: int) -> None:
+        """Run the kernel, helping it on, up to and including an instant."""
+        while (stop := self._run(until_ns)) != kernel.DONE:
+            if stop == kernel.NEEDS_DRAWS:
+                self._refill()
+            elif not kernel.events_with_room(self._memory.cells, self._memory.layout):
+                self._memory.grow()
+
+    def _run(self, until_ns: int) -> int:
+        """Run the kernel as far as it comes, and take over its records."""
+        stop = kernel.run(until_ns, self._memory.cells, self._memory.layout)
+        self._collect()
         return stop
+
+    def _collect(self) -> None:
+        control = self._memory.control
+        self._rows.append(self._memory.table("ended")[: control[ENDED]].copy())
+        if control[TAPPED]:
+            self._tapped.append(self._memory.table("taps")[: control[TAPPED]].copy())
+        control[[ENDED, TAPPED]] = 0
 
     def _refill(self) -> None:
         """Draw another chunk for each stream that has used one up."""
         streams = self._memory.table("streams")
-        for number in np.flatnonzero(streams[:, USED] >= DRAWS_CHUNK):
-            streams[number, USED] -= DRAWS_CHUNK
+        for number in np.flatnonzero(streams[:, USED] >= CHUNK):
+            streams[number, USED] -= CHUNK
             draws = streams[number, FIRST_DRAW:]
-            draws[:DRAWS_CHUNK] = draws[DRAWS_CHUNK:]
-            draws[DRAWS_CHUNK:] = next(self._supplies.chunks[number])
+            draws[:CHUNK] = draws[CHUNK:]
+            draws[CHUNK:] = next(self._supplies.chunks[number])
         self._memory.control[WANTS_DRAWS] = 0

@@ -1,18 +1,11 @@
-"""When the frames of a PMU leave it, in every engine that simulates packets."""
+"""When the frames of a PMU enter the network."""
 
 from tieline.network.packet.draws import jitters
 from tieline.network.spec import Source
 
 
 class Pmu:
-    """When a source's frames leave it: after its processing time, and in order.
-
-    A frame whose jitter would let it overtake the last waits for it.
-
-    Args:
-        source: processing time and jitter.
-        seed: the experiment's.
-    """
+    """When a source's frames leave it: after its processing time, and in order."""
 
     def __init__(self, source: Source, seed: int) -> None:
         self._processing_ns = source.processing_ns
@@ -25,7 +18,7 @@ class Pmu:
         self._last_ns = -1
 
     def ready_ns(self, measured_ns: int) -> int:
-        """Return when the frame measured at an instant leaves; instants must ascend."""
+        """Return when the frame measured at an instant leaves."""
         ready_ns = measured_ns + self._processing_ns
         if self._chunks is not None:
             if not self._chunk:

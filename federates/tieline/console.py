@@ -1,0 +1,44 @@
+"""What commands say: text as it is, and an error as its message with its exit code."""
+
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import typer
+from rich.console import Console
+
+from tieline.errors import TielineError
+
+INTERRUPTED = 130
+UNEXPECTED = 1
+
+
+def say(text: str) -> None:
+    """Print text as it is."""
+    Console().print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+@contextmanager
+def reporting(debug: bool = False) -> Iterator[None]:
+    """Turn an error into its message and exit code, with its traceback when debugging."""
+    try:
+        yield
+    except (typer.Exit, typer.Abort):
+        raise
+    except KeyboardInterrupt:
+        _complain("interrupted", debug)
+        raise typer.Exit(INTERRUPTED) from None
+    except TielineError as error:
+        _complain(str(error), debug)
+        raise typer.Exit(error.exit_code) from None
+    except Exception as error:
+        advice = "" if debug else "; --debug shows where it arose"
+        _complain(f"unexpected {type(error).__name__}: {error}{advice}", debug)
+        raise typer.Exit(UNEXPECTED) from None
+
+
+def _complain(message: str, debug: bool) -> None:
+    console = Console(stderr=True)
+    if debug:
+        console.print(traceback.format_exc(), markup=False, highlight=False, soft_wrap=True)
+    console.print(message, markup=False, highlight=False, soft_wrap=True)

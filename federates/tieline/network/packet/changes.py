@@ -1,0 +1,232 @@
+"""What happens to a network while it runs, done to the kernel's tables between two events.
+
+A change comes before every other event of its instant.
+"""
+
+import numpy as np
+
+from tieline.network.draws import Chunks
+from tieline.network.engine import LINK_DOWN
+from tieline.network.losses import Bernoulli
+from tieline.network.packet.events import ARRIVAL, DEPARTURE, KINDS
+from tieline.network.packet.memory import (
+    BUSY,
+    BYTES,
+    COUNT,
+    DEFICIT,
+    DOWN_DROPS,
+    END_CLASSES,
+    EVENT_LEFT,
+    EVENT_STREAM,
+    FIRST_CLASS,
+    FIRST_DRAW,
+    FIRST_HOP,
+    FREE_AT,
+    HAS_LOSS,
+    HAS_SERVER,
+    HELD_BYTES,
+    HOP,
+    HOP_BYTES,
+    HOP_PORT,
+    HOP_SERVICE,
+    IS_DOWN,
+    IS_SERVING,
+    ITEM,
+    LOSS_STREAM,
+    NONE,
+    ORDER,
+    PACKETS,
+    QUEUE,
+    RATE,
+    RING,
+    RING_HEAD,
+    SPECIAL,
+    TIME,
+    USED,
+    WAITING,
+    WAITING_BYTES,
+    Cells,
+    Memory,
+)
+from tieline.network.packet.packets import dropped
+from tieline.network.packet.routes import Routes
+from tieline.network.packet.supplies import Supplies
+from tieline.network.spec import (
+    LinkCut,
+    LinkRepair,
+    LossChange,
+    NetworkSpec,
+    RateChange,
+    Reroute,
+)
+from tieline.streams import stream
+from tieline.units import NS_PER_S
+
+NOT_YET = 1 << 62
+
+
+class Changes:
+    """The changes of a network that are still to come.
+
+    Args:
+        spec: with its changes in the order of time.
+        supplies: the random streams; those of losses that begin later are opened here.
+        routes: where the routes are that flows take later.
+    """
+
+    def __init__(self, spec: NetworkSpec, supplies: Supplies, routes: Routes) -> None:
+        self._waiting = list(spec.changes)
+        self._reroutes = list(routes.reroutes)
+        self._spec = spec
+        self._streams = {
+            (place, port): supplies.open(_event_losses(supplies.seed, place, change, port, spec))
+            for place, change in enumerate(spec.changes)
+            if isinstance(change, LossChange) and change.probability > 0
+            for port in _ports(change.link)
+        }
+        self._done = 0
+
+    @property
+    def next_ns(self) -> int:
+        """Return when the next change comes."""
+        return self._waiting[0].at_ns if self._waiting else NOT_YET
+
+    def apply(self, memory: Memory) -> set[int]:
+        """Do the next change; return the ports that went down with it."""
+        change = self._waiting.pop(0)
+        down: set[int] = set()
+        if isinstance(change, Reroute):
+            for flow, hop in self._reroutes.pop(0):
+                memory.table("flows")[flow, FIRST_HOP] = hop
+        else:
+            for port in _ports(change.link):
+                if isinstance(change, LinkCut):
+                    _cut(change.at_ns, port, memory)
+                    down.add(port)
+                elif isinstance(change, LinkRepair):
+                    memory.table("ports")[port, SPECIAL] &= ~IS_DOWN
+                elif isinstance(change, RateChange):
+                    _set_rate(change, port, memory)
+                else:
+                    self._set_losses(change, port, memory)
+        self._done += 1
+        return down
+
+    def _set_losses(self, change: LossChange, port: int, memory: Memory) -> None:
+        row, streams = memory.table("ports")[port], memory.table("streams")
+        number = self._streams.get((self._done, port), NONE)
+        row[EVENT_STREAM] = number
+        if number != NONE:
+            row[SPECIAL] |= HAS_LOSS
+            row[EVENT_LEFT] = streams[number, FIRST_DRAW + streams[number, USED]]
+            streams[number, USED] += 1
+        elif row[LOSS_STREAM] == NONE:
+            row[SPECIAL] &= ~HAS_LOSS
+
+
+def _ports(link: int) -> tuple[int, int]:
+    return 2 * link, 2 * link + 1
+
+
+def _event_losses(
+    seed: int, place: int, change: LossChange, port: int, spec: NetworkSpec
+) -> Chunks:
+    """Return the gaps between the losses of an event."""
+    link = spec.links[change.link]
+    origin, target = (link.a, link.b) if port % 2 == 0 else (link.b, link.a)
+    generator = stream(seed, f"loss of {origin}->{target} by change {place}")
+    return Bernoulli(change.probability).gaps(generator)
+
+
+def _cut(now: int, port: int, memory: Memory) -> None:
+    """Take a port down: all that is on it, or waits for it, is dropped at once."""
+    row = memory.table("ports")[port]
+    inside = memory.inside()
+    packets = memory.table("packets")
+    hops = packets[inside, HOP]
+    lost = inside[memory.table("hops")[hops, HOP_PORT] == port]
+    _forget_events(memory, lost, port)
+    memory.free(lost)
+    for slot in lost:
+        _drop(now, int(slot), memory)
+    row[DOWN_DROPS] += len(lost)
+    # What has not been transmitted has not been put on the link either.
+    places = _waiting_places(row)
+    places = places[memory.table("ring")[places, 0] > now]
+    row[PACKETS] -= len(places)
+    row[BYTES] -= memory.table("ring")[places, 1].sum()
+    row[BUSY] -= max(0, row[FREE_AT] - now)
+    row[FREE_AT] = min(row[FREE_AT], now)
+    row[[WAITING, WAITING_BYTES, RING_HEAD, IS_SERVING]] = 0
+    if row[SPECIAL] & HAS_SERVER:
+        classes = memory.table("classes")[row[FIRST_CLASS] : row[END_CLASSES]]
+        classes[:, [COUNT, HELD_BYTES, DEFICIT]] = 0
+    row[SPECIAL] |= IS_DOWN
+
+
+def _forget_events(memory: Memory, slots: Cells, port: int) -> None:
+    """Remove the events of packets, and the end of a port's transmission."""
+    events = memory.events()
+    number, kind = events[:, ITEM] // KINDS, events[:, ITEM] % KINDS
+    is_lost = (kind == ARRIVAL) & np.isin(number, slots)
+    memory.put_events(events[~is_lost & ~((kind == DEPARTURE) & (number == port))])
+
+
+def _drop(now: int, slot: int, memory: Memory) -> None:
+    packet = memory.table("packets")[slot].tolist()
+    dropped(now, packet[0], packet[1], packet[HOP], LINK_DOWN, memory.cells, memory.layout)
+
+
+def _set_rate(change: RateChange, port: int, memory: Memory) -> None:
+    """Give a port another rate: what waits takes it, what is in transmission does not."""
+    row, hops = memory.table("ports")[port], memory.table("hops")
+    own = (hops[:, HOP_PORT] == port) & (hops[:, HOP_SERVICE] != NONE)
+    before = hops[:, HOP_SERVICE].copy()
+    old_rate, row[RATE] = int(row[RATE]), change.rate_bps
+    hops[own, HOP_SERVICE] = _service_ns(hops[own, HOP_BYTES], change.rate_bps)
+    if not row[SPECIAL] & HAS_SERVER:
+        _set_starts(change.at_ns, port, before, old_rate, memory)
+
+
+def _set_starts(now: int, port: int, before: Cells, old_rate: int, memory: Memory) -> None:
+    """Move the starts of what waits at a plain port, and the events that depend on them."""
+    row, hops = memory.table("ports")[port], memory.table("hops")
+    places = _waiting_places(row)
+    ring = memory.table("ring")
+    places = places[ring[places, 0] > now]
+    if len(places) == 0:
+        return
+    events = memory.events().copy()
+    slots = events[:, ITEM] // KINDS
+    is_arrival = events[:, ITEM] % KINDS == ARRIVAL
+    packets = memory.table("packets")
+    on_port = np.zeros(len(events), dtype=bool)
+    on_port[is_arrival] = hops[packets[slots[is_arrival], HOP], HOP_PORT] == port
+    # Events are ordered as packets came, and the last to come are those that wait.
+    own = np.flatnonzero(on_port)
+    waiting = own[np.argsort(events[own, ORDER])][-len(places) :]
+    old_starts, sizes = ring[places, 0].copy(), ring[places, 1]
+    own_hops = packets[slots[waiting], HOP]
+    is_sized = hops[own_hops, HOP_SERVICE] == NONE
+    old = np.where(is_sized, _service_ns(sizes, old_rate), before[own_hops])
+    new = _service_ns(sizes, int(row[RATE]))
+    starts = old_starts[0] + np.cumsum(new) - new
+    ring[places, 0] = starts
+    events[waiting, TIME] += starts + new - old_starts - old
+    memory.put_events(events)
+    row[FREE_AT] = starts[-1] + new[-1]
+    row[BUSY] += int((new - old).sum())
+
+
+def _waiting_places(row: Cells) -> Cells:
+    """Return the rows of `ring` of a plain port, in order; those of a port with a server: none."""
+    if row[SPECIAL] & HAS_SERVER:
+        return np.empty(0, dtype=np.int64)
+    places: Cells = row[RING] + (row[RING_HEAD] + np.arange(row[WAITING])) % max(row[QUEUE], 1)
+    return places
+
+
+def _service_ns(sizes: Cells, rate_bps: int) -> Cells:
+    """Return serialisation times, rounded to the nearest nanosecond."""
+    result: Cells = (16 * sizes * NS_PER_S + rate_bps) // (2 * rate_bps)
+    return result

@@ -1,0 +1,73 @@
+"""Random early detection, in whole numbers, so that every machine drops the same packets.
+
+S. Floyd and V. Jacobson, Random early detection gateways for congestion avoidance, IEEE/ACM Trans.
+Networking 1 (1993), sections IV and VII: the averaged queue, measured in packets, the count since
+the last early drop, and the decay of the average while the port was idle.
+"""
+
+from tieline.compiled import compiled
+from tieline.network.packet.events import take
+from tieline.network.packet.memory import (
+    COLUMNS,
+    FREE_AT,
+    RED,
+    RED_AVERAGE,
+    RED_COUNT,
+    RED_HIGH,
+    RED_LOW,
+    RED_PROBABILITY,
+    RED_SHIFT,
+    RED_STREAM,
+    Cells,
+    Layout,
+)
+
+ONE_PACKET = 1 << 20
+CERTAIN = 1 << 30
+_BITS = 30
+_RED = COLUMNS["red"]
+
+
+@compiled
+def is_dropped_early(
+    now: int, waiting: int, service_ns: int, port: int, cells: Cells, at: Layout
+) -> bool:
+    """Return whether a packet that finds some waiting is dropped, and note that it came."""
+    row = at.red + _RED * cells[port + RED]
+    average = cells[row + RED_AVERAGE]
+    idle_ns = now - cells[port + FREE_AT]
+    if idle_ns > 0:
+        average = (average * _decayed(idle_ns // max(1, service_ns), row, cells)) >> _BITS
+    else:
+        average += (waiting * ONE_PACKET - average) >> cells[row + RED_SHIFT]
+    cells[row + RED_AVERAGE] = average
+    low, high = cells[row + RED_LOW], cells[row + RED_HIGH]
+    if average < low:
+        cells[row + RED_COUNT] = -1
+        return False
+    if average >= high:
+        cells[row + RED_COUNT] = 0
+        return True
+    cells[row + RED_COUNT] += 1
+    share = cells[row + RED_PROBABILITY] * (average - low) // (high - low)
+    # P = share / (1 - count share), so that the packets between two drops are spread evenly.
+    left = CERTAIN - cells[row + RED_COUNT] * share
+    draw = take(cells[row + RED_STREAM], cells, at)
+    if left <= 0 or (draw * left) >> _BITS < share:
+        cells[row + RED_COUNT] = 0
+        return True
+    return False
+
+
+@compiled
+def _decayed(packets: int, row: int, cells: Cells) -> int:
+    """Return (1 - weight)^packets, 2^30 being 1."""
+    result = CERTAIN
+    factor = CERTAIN - (CERTAIN >> cells[row + RED_SHIFT])
+    left = packets
+    while left > 0 and result > 0:
+        if left & 1:
+            result = (result * factor) >> _BITS
+        factor = (factor * factor) >> _BITS
+        left >>= 1
+    return result

@@ -1,0 +1,118 @@
+"""Keeps the statistics of a run of the network, window by window, and writes its tables."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tieline.network.age import AgeOfInformation
+from tieline.network.engine import NO_ARRIVALS, NO_DROPS, Engine, Outcome
+from tieline.network.results import PacketLog, write_ages, write_delays, write_flows, write_links
+from tieline.network.series import ControllerSeries, LinkSeries
+from tieline.network.spec import NetworkSpec, least_delay_ns
+from tieline.network.stats import FlowStatistics
+from tieline.units import NS_PER_S
+
+
+class Recorder:
+    """What becomes a network's tables.
+
+    The caller runs the engine from one of the instants of `stops` to the next and hands over what
+    ended on the way, so that windows are exact however often the federates meet.
+
+    Args:
+        folder: where the tables go.
+        spec: sources, destinations and flows.
+        engine: what carries the packets.
+        rate_hz: frames a second.
+        window_ns: length of the windows of the series, or None to write none.
+        record_packets: whether packets.parquet is written.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        spec: NetworkSpec,
+        engine: Engine,
+        rate_hz: int,
+        window_ns: int | None,
+        record_packets: bool,
+    ) -> None:
+        self._folder = folder
+        self._spec = spec
+        self._engine = engine
+        self._rate_hz = rate_hz
+        flow_of = np.arange(len(spec.flows)).reshape(len(spec.sources), len(spec.destinations))
+        self._flow_of = flow_of
+        least_ns = [least_delay_ns(spec, flow) for flow in spec.flows]
+        self._flows = FlowStatistics(np.array(least_ns, dtype=np.int64), flow_of)
+        self._age = AgeOfInformation(len(spec.flows))
+        self._log = PacketLog(folder / "packets.parquet", flow_of) if record_packets else None
+        self._window_ns = window_ns
+        self._windows = 0
+        self._until_ns = 0
+        if window_ns is not None:
+            self._links = LinkSeries(folder / "link_series.parquet", engine)
+            path = folder / "controller_series.parquet"
+            self._controllers = ControllerSeries(path, spec, flow_of)
+        # Compiles, where that is still to be done, before the federation waits for an answer.
+        self.add(Outcome(NO_ARRIVALS, NO_DROPS), 0)
+
+    def stops(self, until_ns: int) -> list[int]:
+        """Return the ends of windows that the engine must stop at, and `until_ns`."""
+        if self._window_ns is None:
+            return [until_ns]
+        first = (self._windows + 1) * self._window_ns
+        ends = range(first, until_ns + 1, self._window_ns)
+        return [*ends] if until_ns in ends else [*ends, until_ns]
+
+    def add_sent(self, sources: NDArray[np.int64], sequence: int) -> None:
+        """Count frame `sequence` of these sources."""
+        self._flows.add_sent(sources, sequence)
+
+    def add(self, outcome: Outcome, until_ns: int) -> None:
+        """Take what ended up to `until_ns`, the next of the `stops`.
+
+        Raises:
+            CosimError: a packet ended twice.
+        """
+        arrivals, drops = outcome.arrivals, outcome.drops
+        measured_ns = self._measured_ns(arrivals)
+        self._until_ns = until_ns
+        self._flows.add(outcome, measured_ns)
+        flows = self._flow_of[arrivals["source"], arrivals["destination"]]
+        self._age.add(flows, arrivals["arrival_ns"], measured_ns)
+        if self._log is not None:
+            self._log.add(outcome, measured_ns, self._measured_ns(drops))
+        if self._window_ns is not None:
+            self._controllers.add(arrivals, arrivals["arrival_ns"] - measured_ns, drops)
+            if until_ns == (self._windows + 1) * self._window_ns:
+                self._close_window(self._window_ns)
+
+    def write(self) -> None:
+        """Write the tables as far as the run came; the last window may be a shorter one.
+
+        Nothing can be added after it; writing again does no harm.
+        """
+        end_ns = self._until_ns
+        write_flows(self._folder / "flows.parquet", self._spec, self._flows, self._age, end_ns)
+        write_links(self._folder / "links.parquet", self._engine.links(), end_ns)
+        write_delays(self._folder / "delays.parquet", self._flows)
+        write_ages(self._folder / "ages.parquet", self._spec, self._flow_of, self._age, end_ns)
+        if self._log is not None:
+            self._log.close()
+        if self._window_ns is not None:
+            rest_ns = end_ns - self._windows * self._window_ns
+            if rest_ns > 0:
+                self._close_window(rest_ns)
+            self._links.close()
+            self._controllers.close()
+            self._window_ns = None
+
+    def _close_window(self, length_ns: int) -> None:
+        self._links.close_window(self._until_ns, length_ns)
+        self._controllers.close_window(self._until_ns, self._age.measured_ns)
+        self._windows += 1
+
+    def _measured_ns(self, records: NDArray[np.void]) -> NDArray[np.int64]:
+        return records["sequence"].astype(np.int64) * NS_PER_S // self._rate_hz

@@ -1,0 +1,1 @@
+"""Topologies of the packet network: generated, imported, checked and drawn."""
