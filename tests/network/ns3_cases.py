@@ -47,6 +47,7 @@ class Fate:
 def fate(make: Callable[..., Engine], case: Case) -> Fate:
     """Return what an engine makes of a case."""
     engine = make(case.spec, case.seed)
+    counters = engine.link_counters().tobytes()
     sources = len(case.spec.sources)
     if case.until_ns is None:
         outcome = carried(engine, case.frames, case.steps, sources)
@@ -54,7 +55,8 @@ def fate(make: Callable[..., Engine], case: Case) -> Fate:
         for measured_ns, sequence in case.frames:
             engine.send(measured_ns, np.arange(sources), sequence)
         outcome = engine.run_until(case.until_ns)
-    counters = engine.link_counters().tobytes() + engine.link_counters().tobytes()
+    for _ in range(2):
+        counters += engine.link_counters().tobytes()
     result = Fate(
         outcome.arrivals.tobytes(),
         outcome.drops.tobytes(),

@@ -53,6 +53,7 @@ PROMISES = (
     "test_every_frame_reaches_every_destination_once",
     "test_arrivals_lie_in_their_window_and_in_order",
     "test_counts_follow_the_packets",
+    "test_before_the_first_step_no_link_has_carried_anything",
     "test_no_frames_is_no_traffic",
 )
 """The tests that ns-3, which runs in a process of its own, has to pass as well."""
@@ -106,6 +107,14 @@ def test_counts_follow_the_packets(engine):
     engine.run_until(10**9)
     counts = engine.counts()
     assert (counts.sent, counts.delivered, counts.in_flight) == (6, 6, 0)
+
+
+def test_before_the_first_step_no_link_has_carried_anything(engine):
+    """Otherwise the first window of the links' series would show what never happened."""
+    counters = engine.link_counters()
+    assert len(counters) == len(engine.links())
+    assert all(not counters[name].any() for name in counters.dtype.names)
+    assert all(link.busy_ns == 0 for link in engine.links())
 
 
 def test_no_frames_is_no_traffic(engine):

@@ -163,7 +163,7 @@ class PacketEngine:
                 bytes=rows[port][BYTES],
                 dropped_queue=rows[port][QUEUE_DROPS],
                 dropped_loss=rows[port][LOSS_DROPS],
-                busy_ns=rows[port][BUSY] - max(0, rows[port][FREE_AT] - self._now_ns),
+                busy_ns=rows[port][BUSY] - max(0, rows[port][FREE_AT] - max(0, self._now_ns)),
                 max_queue=max(before[port], rows[port][MAX_QUEUE]),
                 dropped_down=rows[port][DOWN_DROPS],
             )
@@ -190,7 +190,9 @@ class PacketEngine:
         """Return the counters of each link's directions, and begin a new span for `max_queue`."""
         ports = self._memory.table("ports")
         memory = self._memory
-        counters = read_counters(self._now_ns, len(ports), memory.cells, memory.layout)
+        # Before the first step, too, when nothing has been in transmission.
+        now_ns = max(0, self._now_ns)
+        counters = read_counters(now_ns, len(ports), memory.cells, memory.layout)
         np.maximum(self._max_queue, counters["max_queue"], out=self._max_queue)
         ports[:, MAX_QUEUE] = counters["queue"]
         return counters
