@@ -106,7 +106,7 @@ MISTAKES = [
     ("[2, 4]", "[2, 4]\n  weights: [1, -1]", 15, ["wams.weights[1] must be 0 or more"]),
     ("  duration: 41 s", "  steps_per_second: 250", 13, ["must be a multiple of the 60 reports"]),
     ("  duration: 41 s", "  records_per_second: 70", 6, ["must divide", "70", "60 would do"]),
-    ("engine: packet", "engine: ns33", 16, ["ideal, constant, packet", "'ns33'"]),
+    ("engine: packet", "engine: ns33", 16, ["ideal, constant, empirical", "'ns33'"]),
     ("engine: packet", "engine: pakcet", 16, ["network.engine must be one of", "mean 'packet'"]),
     (
         "engine: packet",

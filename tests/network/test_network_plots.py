@@ -53,7 +53,7 @@ def test_a_window_without_a_row_is_drawn_as_an_idle_link() -> None:
     row = {"from": "a", "to": "b", "utilisation": 0.5, "max_queue": 3, "dropped_loss": 1}
     other = row | {"from": "b", "to": "a", "utilisation": 0.1}
     rows = [row | {"t_s": 0.1}, other | {"t_s": 0.2}, row | {"t_s": 0.3}]
-    figure = busiest_links(pd.DataFrame(rows).assign(dropped_queue=2))
+    figure = busiest_links(pd.DataFrame(rows).assign(dropped_queue=2, dropped_down=0))
     load, queue, drops = (axes.lines[0].get_ydata().tolist() for axes in figure.axes)
     assert (load, queue, drops) == ([50.0, 0.0, 50.0], [3, 0, 3], [3, 3, 6])
     assert figure.legends[0].get_texts()[0].get_text() == "a to b"

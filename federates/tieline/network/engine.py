@@ -40,6 +40,27 @@ LINK_COUNTER = np.dtype(
 """What one direction of one link has carried since the start, as `LinkUse`; `queue` is the packets
 that wait now, and `max_queue` the most that waited since the counters were last read."""
 
+TAP = np.dtype(
+    [
+        ("sent_ns", "<i8"),
+        ("port", "<i4"),
+        ("flow", "<i4"),
+        ("sequence", "<i4"),
+        ("hop", "<i4"),
+        ("part", "<i4"),
+        ("bytes", "<i4"),
+        ("is_back", "u1"),
+    ]
+)
+"""A packet that goes on a link.
+
+`sent_ns` is when its first bit does; `port` the link's direction, as in `NetworkSpec.ports`; `flow`
+the number of the PMU flow (one of those that a multicast packet serves), or their count plus that
+of the cross flow; `hop` the place of the link on the route, from 0; `part` the number of the
+fragment, from 0; `bytes` those from the IPv4 header on; `is_back` is 1 for replies and
+acknowledgements, which go from the flow's target to its source.
+"""
+
 DELIVERED, QUEUE_FULL, LOSS, LINK_DOWN = 0, 1, 2, 3
 """How a packet ends: at its controller, at a queue, corrupted on a link, or with its link."""
 

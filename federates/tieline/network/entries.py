@@ -5,6 +5,7 @@ from typing import Any, TypeVar
 
 import networkx as nx
 
+from tieline.errors import InputError
 from tieline.network.entry import Entry
 from tieline.network.findings import Findings
 from tieline.network.jitter import Jitter, JitterEntry
@@ -82,7 +83,7 @@ class Entries:
         self._added = Findings(Document(document.path, own, {}), "network.")
         self._findings.keys(self._data, (), SECTIONS, required=("nodes", "links"))
         self.nodes = self._read_nodes()
-        self._names = [node.name for node in self.nodes]
+        self._names = dict.fromkeys(node.name for node in self.nodes)
         self._defaults = self._read("link_defaults", LinkDefaults)
         self.links = self._read_links()
         self.pmu = self._read("pmu", PmuEntry) or PmuEntry.model_validate({})
@@ -100,8 +101,9 @@ class Entries:
 
     def refuse(self) -> None:
         """Raise InputError with everything that is wrong, if anything is."""
-        self._findings.refuse()
-        self._added.refuse()
+        found = [*self._findings.lines(), *self._added.lines()]
+        if found:
+            raise InputError(found)
 
     def _read(self, section: str, model: type[AnEntry]) -> AnEntry | None:
         return self._findings.entry(self._data.get(section, {}), (section,), model)

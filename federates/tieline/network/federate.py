@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tieline.cosim.interfaces import DELIVERY, NETWORK, Clock, DeliveryBundle, FrameBundle
 from tieline.errors import CosimError, TimeContractBroken
+from tieline.network.captures import Captures
 from tieline.network.engine import Engine, Outcome, joined
 from tieline.network.linkless import open_without_links
 from tieline.network.ns3 import Ns3Engine
@@ -41,8 +42,11 @@ def open_participant(run: dict[str, Any], folder: Path) -> "NetworkParticipant":
     clock = Clock(**run["clock"])
     window_s = settings.series_window
     window_ns = None if window_s is None else seconds_to_ns(window_s)
+    captures = None
+    if isinstance(engine, PacketEngine):
+        captures = Captures(folder, spec, engine, round(run["frequency_hz"]), clock.rate_hz)
     recorder = Recorder(folder, spec, engine, clock.rate_hz, window_ns, settings.record_packets)
-    return NetworkParticipant(clock, spec, engine, recorder)
+    return NetworkParticipant(clock, spec, engine, recorder, captures)
 
 
 class NetworkParticipant:
@@ -53,15 +57,24 @@ class NetworkParticipant:
         spec: sources, destinations and flows.
         engine: what carries the packets.
         recorder: keeps the statistics of what became of them.
+        captures: writes what some links carry, or none.
     """
 
     name = NETWORK
 
-    def __init__(self, clock: Clock, spec: NetworkSpec, engine: Engine, recorder: Recorder) -> None:
+    def __init__(
+        self,
+        clock: Clock,
+        spec: NetworkSpec,
+        engine: Engine,
+        recorder: Recorder,
+        captures: Captures | None = None,
+    ) -> None:
         self._clock = clock
         self._spec = spec
         self._engine = engine
         self._recorder = recorder
+        self._captures = captures
         self._frames = _FrameStore(len(spec.destinations))
 
     def start(self) -> list[bytes]:
@@ -88,12 +101,16 @@ class NetworkParticipant:
 
     def finish(self) -> None:
         """Write the tables."""
-        self._recorder.write()
-        self._engine.close()
+        self._write()
 
     def abort(self, reason: str) -> None:
         """Write the tables as far as the run came."""
+        self._write()
+
+    def _write(self) -> None:
         self._recorder.write()
+        if self._captures is not None:
+            self._captures.close()
         self._engine.close()
 
     def _carry(self, k: int) -> bytes:
@@ -105,6 +122,8 @@ class NetworkParticipant:
         for stop_ns in self._recorder.stops(until_ns):
             outcomes.append(self._engine.run_until(stop_ns))
             self._recorder.add(outcomes[-1], stop_ns)
+        if self._captures is not None:
+            self._captures.add(until_ns, self._frames.payloads_of)
         return self._bundle(joined(outcomes), until_ns).to_bytes()
 
     def _check(self, k: int, bundle: FrameBundle) -> None:
@@ -142,6 +161,16 @@ class _FrameStore:
         """Keep the frames of one instant, one packet to each destination."""
         self._payloads[sequence] = payloads
         self._under_way[sequence] = len(payloads) * self._destinations
+
+    def payloads_of(
+        self, sources: NDArray[np.int64], sequences: NDArray[np.int64]
+    ) -> NDArray[np.uint8]:
+        """Return the frames (n, size) of sources and sequence numbers (n,)."""
+        frames = np.empty((len(sources), FRAME_BYTES), np.uint8)
+        for sequence in np.unique(sequences):
+            is_own = sequences == sequence
+            frames[is_own] = self._payloads[int(sequence)][sources[is_own]]
+        return frames
 
     def take(self, outcome: Outcome) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
         """Return the table of payloads that arrived, each once, and the row of each arrival."""

@@ -73,7 +73,7 @@ class Findings:
     def word(self, given: Any, allowed: Collection[str], position: Position, kind: str) -> None:
         """Note a word that is none of the allowed ones, with the nearest of them."""
         if given not in allowed:
-            self.add(position, f"unknown {kind} '{given}'{nearest(given, allowed)}")
+            self._unknown(kind, given, allowed, position)
 
     def entry(self, value: Any, position: Position, model: type[AnEntry]) -> AnEntry | None:
         """Return a checked entry, or none and the findings."""
@@ -95,12 +95,15 @@ class Findings:
         elif tag not in value:
             self.add(position, f"{name} lacks '{tag}' (allowed: {', '.join(models)})")
         elif value[tag] not in models:
-            given = value[tag]
-            text = f"unknown {tag} '{given}'{nearest(given, models)}"
-            self.add((*position, tag), text)
+            self._unknown(tag, value[tag], models, (*position, tag))
         else:
             return self.entry(value, position, models[value[tag]])
         return None
+
+    def _unknown(self, kind: str, given: Any, allowed: Collection[str], position: Position) -> None:
+        # Where there is no line to say where, the sentence must.
+        name = f"{'.'.join(str(part) for part in position)}: " if self._prefix else ""
+        self.add(position, f"{name}unknown {kind} '{given}'{nearest(given, allowed)}")
 
     def _detail(self, detail: Any, position: Position, model: type[Entry]) -> None:
         inner = self._existing(position, detail["loc"])

@@ -57,7 +57,9 @@ class Router:
         # length, and never against a shorter one.
         scale = 1 if routing.is_split else len(self._graph) + 1
         for link in sorted(up, key=lambda link: sorted((link.a, link.b))):
-            length = _length(link, routing.metric) * scale + (0 if routing.is_split else 1)
+            length = _length(link, routing.metric) * scale
+            # No link has length zero: equal ways could go round in a circle.
+            length = length or 1 if routing.is_split else length + 1
             self._graph.add_edge(*sorted((link.a, link.b)), length=length)
         self._paths: dict[str, dict[str, list[str]]] = {}
         self._before: dict[str, dict[str, list[str]]] = {}

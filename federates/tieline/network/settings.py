@@ -129,6 +129,12 @@ class NetworkSettings(BaseModel):
     events: tuple[dict[str, Any], ...] = Field(
         (), description="what happens to links besides the topology's own events"
     )
+    convergence: Seconds | None = Field(
+        None,
+        ge=0,
+        le=1e4,
+        description="time until routes follow a failure or repair, in place of the topology's own, s",
+    )
     capture: tuple[tuple[str, str], ...] = Field(
         (), description="links (pairs of nodes) whose packets are written to capture files"
     )

@@ -111,7 +111,7 @@ def _resolved(entries: Entries, settings: NetworkSettings) -> NetworkSpec:
         Destination(site["name"], site["unit"], site["bus"], at_bus[site["bus"]], *controller)
         for site in entries.destinations
     )
-    routing = _routing(entries)
+    routing = _routing(entries, settings)
     names = [node.name for node in entries.nodes]
     ends = [(source.node, place.node) for source in sources for place in destinations]
     router = Router(routing, names, entries.links)
@@ -141,9 +141,9 @@ def _resolved(entries: Entries, settings: NetworkSettings) -> NetworkSpec:
     )
 
 
-def _routing(entries: Entries) -> Routing:
+def _routing(entries: Entries, settings: NetworkSettings) -> Routing:
     stated = entries.routing
-    wait_s = stated.convergence
+    wait_s = stated.convergence if settings.convergence is None else settings.convergence
     return Routing(
         stated.metric,
         stated.equal_cost == "split",

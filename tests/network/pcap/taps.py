@@ -58,7 +58,7 @@ def tapped(plan: AddressPlan) -> NDArray[np.void]:
         for k in range(FRAMES):
             ready_ns = tick_ns(k, RATE_HZ) + 3_000_000 * hop
             packets += [
-                (ready_ns, port, flow, k, hop, part, size)
+                (ready_ns, port, flow, k, hop, part, size, 0)
                 for part, size in enumerate(_parts(plan.flows[flow]))
             ]
     records = np.array(packets, TAP)

@@ -25,7 +25,7 @@ from tieline.network.pcap import TAP, TCP, UDP, Capture, address_plan, stream_co
 from tieline.network.pcap.addresses import mac_bytes
 
 STEP_NS = 1_000_000_000 // RATE_HZ
-CROSS_BYTES = [flow.payload_bytes for flow in SPEC.cross_flows]
+CROSS_BYTES = [flow.traffic.payload_bytes for flow in SPEC.cross_flows]
 CONFIGURATIONS = stream_configurations(SPEC, IDCODES, 60, RATE_HZ, EPOCH_S)
 
 

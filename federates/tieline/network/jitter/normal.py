@@ -5,11 +5,14 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from tieline.network.entry import Entry
 from tieline.network.jitter.base import Jitter
 from tieline.units import Seconds, seconds_to_ns
+
+MOST_DEVIATION = 100
+"""In means: nearly all draws of a wider distribution would be outside the cut."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,15 @@ class NormalEntry(Entry):
     distribution: Literal["normal"]
     mean: Seconds = Field(ge=1e-9, le=10, description="mean delay")
     deviation: Seconds = Field(ge=1e-9, le=10, description="standard deviation before the cut")
+
+    @model_validator(mode="after")
+    def _narrow(self) -> "NormalEntry":
+        if self.deviation > MOST_DEVIATION * self.mean:
+            raise ValueError(
+                f"'deviation' must not exceed {MOST_DEVIATION} times 'mean' "
+                f"({self.deviation:g} s > {MOST_DEVIATION} x {self.mean:g} s)"
+            )
+        return self
 
     def jitter(self) -> Jitter:
         """Return the distribution."""

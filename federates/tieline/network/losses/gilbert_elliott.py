@@ -5,6 +5,7 @@ Elliott, Estimates of error rates for codes on burst-noise channels, the same 42
 may change after every packet.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -16,7 +17,8 @@ from tieline.network.draws import CHUNK, NEVER, Chunk, Chunks, chunked
 from tieline.network.entry import Entry
 from tieline.network.losses.base import Loss
 
-PACKETS_AT_A_TIME = 200_000
+MOST_VISITS = 100_000
+"""Visits to each state that are drawn at a time."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +54,9 @@ class GilbertElliott:
         return self.share_bad * self.loss_bad + (1.0 - self.share_bad) * self.loss_good
 
     def _parts(self, generator: np.random.Generator) -> Iterator[Chunk]:
-        """Yield gaps, some visits to both states at a time."""
-        visits = int(PACKETS_AT_A_TIME / (1.0 / self.to_bad + 1.0 / self.to_good))
-        visits = min(max(visits, 1), CHUNK)
+        """Yield gaps, as many visits to both states at a time as hold about a chunk of losses."""
+        losses = self.loss_bad / self.to_good + self.loss_good / self.to_bad
+        visits = math.ceil(min(CHUNK / losses, MOST_VISITS))
         is_bad = bool(generator.random() < self.share_bad)
         since = 0
         while True:
@@ -99,10 +101,10 @@ class GilbertElliottEntry(Entry):
     """Losses in bursts."""
 
     model: Literal["gilbert_elliott"]
-    to_bad: float = Field(gt=0, le=1, strict=True, description="good state ends, each packet")
-    to_good: float = Field(gt=0, le=1, strict=True, description="bad state ends, each packet")
+    to_bad: float = Field(ge=1e-6, le=1, strict=True, description="good state ends, each packet")
+    to_good: float = Field(ge=1e-6, le=1, strict=True, description="bad state ends, each packet")
     loss_good: float = Field(0.0, ge=0, lt=1, strict=True, description="loss in the good state")
-    loss_bad: float = Field(1.0, gt=0, le=1, strict=True, description="loss in the bad state")
+    loss_bad: float = Field(1.0, ge=1e-3, le=1, strict=True, description="loss in the bad state")
 
     @model_validator(mode="after")
     def _ordered(self) -> "GilbertElliottEntry":

@@ -67,8 +67,8 @@ LEAST_WAIT_NS = 200_000_000
 """Least retransmission time of Linux; RFC 6298 would have a second."""
 
 
-def laid_out(spec: NetworkSpec, supplies: Supplies) -> tuple[Memory, Changes]:
-    """Return the memory before the first event, and what will be changed in it.
+def laid_out(spec: NetworkSpec, supplies: Supplies) -> tuple[Memory, Changes, Routes]:
+    """Return the memory before the first event, what will be changed in it, and the routes.
 
     Raises:
         InputError: one source has more flows than a chunk of random numbers, or a link's MTU does
@@ -104,7 +104,7 @@ def laid_out(spec: NetworkSpec, supplies: Supplies) -> tuple[Memory, Changes]:
         "first_tree": routes.first_tree,
         "most_packets": most,
     }
-    return Memory(tables, _FIRST_CAPACITY + 4 * most, bounds), changes
+    return Memory(tables, _FIRST_CAPACITY + 4 * most, bounds), changes, routes
 
 
 def _most_packets(spec: NetworkSpec, routes: Routes) -> int:

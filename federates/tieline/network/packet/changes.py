@@ -21,6 +21,8 @@ from tieline.network.packet.memory import (
     FIRST_CLASS,
     FIRST_DRAW,
     FIRST_HOP,
+    FLOW,
+    FRAGMENT,
     FREE_AT,
     HAS_LOSS,
     HAS_SERVER,
@@ -40,6 +42,7 @@ from tieline.network.packet.memory import (
     RATE,
     RING,
     RING_HEAD,
+    SEQUENCE,
     SPECIAL,
     TIME,
     USED,
@@ -63,6 +66,7 @@ from tieline.streams import stream
 from tieline.units import NS_PER_S
 
 NOT_YET = 1 << 62
+NOTHING: Cells = np.empty(0, dtype=np.int64)
 
 
 class Changes:
@@ -91,26 +95,29 @@ class Changes:
         """Return when the next change comes."""
         return self._waiting[0].at_ns if self._waiting else NOT_YET
 
-    def apply(self, memory: Memory) -> set[int]:
-        """Do the next change; return the ports that went down with it."""
+    def apply(self, memory: Memory) -> dict[int, Cells]:
+        """Do the next change; return when what waits now starts, by ports where that has changed.
+
+        Nothing waits any more at a port that went down.
+        """
         change = self._waiting.pop(0)
-        down: set[int] = set()
+        starts: dict[int, Cells] = {}
         if isinstance(change, Reroute):
-            for flow, hop in self._reroutes.pop(0):
-                memory.table("flows")[flow, FIRST_HOP] = hop
+            for flow, hop, piece in self._reroutes.pop(0):
+                memory.table("flows")[flow, [FIRST_HOP, FRAGMENT]] = hop, piece
         else:
             for port in _ports(change.link):
                 if isinstance(change, LinkCut):
                     _cut(change.at_ns, port, memory)
-                    down.add(port)
+                    starts[port] = NOTHING
                 elif isinstance(change, LinkRepair):
                     memory.table("ports")[port, SPECIAL] &= ~IS_DOWN
                 elif isinstance(change, RateChange):
-                    _set_rate(change, port, memory)
+                    starts[port] = _set_rate(change, port, memory)
                 else:
                     self._set_losses(change, port, memory)
         self._done += 1
-        return down
+        return starts
 
     def _set_losses(self, change: LossChange, port: int, memory: Memory) -> None:
         row, streams = memory.table("ports")[port], memory.table("streams")
@@ -145,6 +152,8 @@ def _cut(now: int, port: int, memory: Memory) -> None:
     packets = memory.table("packets")
     hops = packets[inside, HOP]
     lost = inside[memory.table("hops")[hops, HOP_PORT] == port]
+    # By what they carry: slots depend on when the tables grew, and so on the caller's steps.
+    lost = lost[np.lexsort((packets[lost, SEQUENCE], packets[lost, FLOW]))]
     _forget_events(memory, lost, port)
     memory.free(lost)
     for slot in lost:
@@ -152,7 +161,7 @@ def _cut(now: int, port: int, memory: Memory) -> None:
     row[DOWN_DROPS] += len(lost)
     # What has not been transmitted has not been put on the link either.
     places = _waiting_places(row)
-    places = places[memory.table("ring")[places, 0] > now]
+    places = places[memory.table("ring")[places, 0] >= now]
     row[PACKETS] -= len(places)
     row[BYTES] -= memory.table("ring")[places, 1].sum()
     row[BUSY] -= max(0, row[FREE_AT] - now)
@@ -177,25 +186,29 @@ def _drop(now: int, slot: int, memory: Memory) -> None:
     dropped(now, packet[0], packet[1], packet[HOP], LINK_DOWN, memory.cells, memory.layout)
 
 
-def _set_rate(change: RateChange, port: int, memory: Memory) -> None:
-    """Give a port another rate: what waits takes it, what is in transmission does not."""
+def _set_rate(change: RateChange, port: int, memory: Memory) -> Cells:
+    """Give a port another rate: what waits takes it, what is in transmission does not.
+
+    Returns when the packets start that wait at a plain port.
+    """
     row, hops = memory.table("ports")[port], memory.table("hops")
     own = (hops[:, HOP_PORT] == port) & (hops[:, HOP_SERVICE] != NONE)
     before = hops[:, HOP_SERVICE].copy()
     old_rate, row[RATE] = int(row[RATE]), change.rate_bps
     hops[own, HOP_SERVICE] = _service_ns(hops[own, HOP_BYTES], change.rate_bps)
-    if not row[SPECIAL] & HAS_SERVER:
-        _set_starts(change.at_ns, port, before, old_rate, memory)
+    if row[SPECIAL] & HAS_SERVER:
+        return NOTHING
+    return _set_starts(change.at_ns, port, before, old_rate, memory)
 
 
-def _set_starts(now: int, port: int, before: Cells, old_rate: int, memory: Memory) -> None:
+def _set_starts(now: int, port: int, before: Cells, old_rate: int, memory: Memory) -> Cells:
     """Move the starts of what waits at a plain port, and the events that depend on them."""
     row, hops = memory.table("ports")[port], memory.table("hops")
     places = _waiting_places(row)
     ring = memory.table("ring")
-    places = places[ring[places, 0] > now]
+    places = places[ring[places, 0] >= now]
     if len(places) == 0:
-        return
+        return NOTHING
     events = memory.events().copy()
     slots = events[:, ITEM] // KINDS
     is_arrival = events[:, ITEM] % KINDS == ARRIVAL
@@ -216,12 +229,13 @@ def _set_starts(now: int, port: int, before: Cells, old_rate: int, memory: Memor
     memory.put_events(events)
     row[FREE_AT] = starts[-1] + new[-1]
     row[BUSY] += int((new - old).sum())
+    return starts
 
 
 def _waiting_places(row: Cells) -> Cells:
     """Return the rows of `ring` of a plain port, in order; those of a port with a server: none."""
     if row[SPECIAL] & HAS_SERVER:
-        return np.empty(0, dtype=np.int64)
+        return NOTHING
     places: Cells = row[RING] + (row[RING_HEAD] + np.arange(row[WAITING])) % max(row[QUEUE], 1)
     return places
 

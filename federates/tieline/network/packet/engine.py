@@ -30,6 +30,7 @@ from tieline.network.packet.memory import (
     FIRST_DRAW,
     FIRST_MEMBER,
     FLOW,
+    FRAGMENT,
     FREE_AT,
     FREE_PACKETS,
     GAP_STREAM,
@@ -42,27 +43,12 @@ from tieline.network.packet.memory import (
     PACKETS,
     QUEUE_DROPS,
     SENT,
-    TAP_PORT,
-    TAP_TIME,
-    TAPPED,
     USED,
     WANTS_DRAWS,
 )
 from tieline.network.packet.pmu import Pmu
+from tieline.network.packet.taps import Taps
 from tieline.network.spec import NetworkSpec
-
-TAP = np.dtype(
-    [
-        ("sent_ns", "<i8"),
-        ("port", "<i4"),
-        ("flow", "<i4"),
-        ("sequence", "<i4"),
-        ("hop", "<i4"),
-        ("bytes", "<i4"),
-    ]
-)
-"""A packet on a link that is listened to: when its first bit left, the direction, its flow (PMU
-flows first, then the others), the number of its frame or segment, and its IP bytes."""
 
 
 class PacketEngine:
@@ -85,7 +71,8 @@ class PacketEngine:
     def __init__(self, spec: NetworkSpec, seed: int) -> None:
         self._spec = spec
         self._supplies = Supplies(seed)
-        self._memory, self._changes = laid_out(spec, self._supplies)
+        self._memory, self._changes, routes = laid_out(spec, self._supplies)
+        self._taps = Taps(self._memory, routes)
         self._pmus = [Pmu(source, seed) for source in spec.sources]
         self._endings = Endings(spec)
         self._flows_of = self._endings.flows_of_sources()
@@ -93,7 +80,6 @@ class PacketEngine:
         self._now_ns = -1
         self._rows: list[NDArray[np.int64]] = []
         self._sent = 0
-        self._tapped: list[NDArray[np.int64]] = []
         self._max_queue = np.zeros(len(spec.ports), dtype=np.int64)
         self._start_cross_flows()
 
@@ -176,15 +162,16 @@ class PacketEngine:
         Returns:
             (n,) of `TAP`, in order of time.
         """
-        rows = np.concatenate([*self._tapped, np.empty((0, 6), np.int64)])
-        is_due = rows[:, TAP_TIME] <= self._now_ns
-        self._tapped = [rows[~is_due]]
-        due = rows[is_due]
-        due = due[np.argsort(due[:, TAP_TIME], kind="stable")]
-        records = np.empty(len(due), TAP)
-        for column, name in enumerate(TAP.names or ()):
-            records[name] = due[:, column]
-        return records
+        return self._taps.due(self._now_ns)
+
+    @property
+    def fragment_bytes(self) -> NDArray[np.int64]:
+        """Return (flows,) the most of a datagram that a packet of each PMU and cross flow takes.
+
+        0 where datagrams are never cut.
+        """
+        count = len(self._spec.flows) + len(self._spec.cross_flows)
+        return np.maximum(self._memory.table("flows")[:count, FRAGMENT], 0)
 
     def link_counters(self) -> NDArray[np.void]:
         """Return the counters of each link's directions, and begin a new span for `max_queue`."""
@@ -214,17 +201,11 @@ class PacketEngine:
     def _change(self) -> None:
         """Do the next change of the network."""
         at_ns = self._changes.next_ns
-        while (
-            len(self._memory.inside()) * self._memory.layout.most_packets
-            > self._memory.layout.capacity
-        ):
+        while self._inside() > self._memory.layout.capacity:
             self._memory.grow()
-        down = list(self._changes.apply(self._memory))
+        starts = self._changes.apply(self._memory)
         self._collect()
-        # What waited at a link that went down has not gone on it.
-        for place, rows in enumerate(self._tapped):
-            never = (rows[:, TAP_TIME] >= at_ns) & np.isin(rows[:, TAP_PORT], down)
-            self._tapped[place] = rows[~never]
+        self._taps.move(starts, at_ns)
 
     def _announce(
         self, times_ns: NDArray[np.int64], items: NDArray[np.int64], base_order: int
@@ -273,9 +254,8 @@ class PacketEngine:
     def _collect(self) -> None:
         control = self._memory.control
         self._rows.append(self._memory.table("ended")[: control[ENDED]].copy())
-        if control[TAPPED]:
-            self._tapped.append(self._memory.table("taps")[: control[TAPPED]].copy())
-        control[[ENDED, TAPPED]] = 0
+        control[ENDED] = 0
+        self._taps.collect()
 
     def _refill(self) -> None:
         """Draw another chunk for each stream that has used one up."""

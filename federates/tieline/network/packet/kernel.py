@@ -43,6 +43,7 @@ from tieline.network.packet.memory import (
     LOST,
     NO_PORT,
     NONE,
+    SENT,
     SEQUENCE,
     SIZE_STREAM,
     TAPPED,
@@ -109,7 +110,7 @@ def run(until_ns: int, cells: Cells, at: Layout) -> int:
             elif kind == TIMER:
                 tcp.on_timer(now, number, cells, at)
             else:
-                enter(now, number, 0, cells, at)
+                _reply(now, number, cells, at)
     return DONE
 
 
@@ -196,21 +197,30 @@ def _reach_target(now: int, flow: int, sequence: int, cells: Cells, at: Layout) 
 
 
 @compiled
+def _reply(now: int, flow: int, cells: Cells, at: Layout) -> None:
+    """The target of a request answers it."""
+    row = at.cross + _CROSS * (flow - at.pmu_flows)
+    enter(now, flow, cells[row + SENT], cells, at)
+
+
+@compiled
 def _send_cross(now: int, number: int, cells: Cells, at: Layout) -> None:
     """A cross flow sends a packet and plans its next one."""
     row = at.cross + _CROSS * number
     flow = at.pmu_flows + number
     if cells[at.flows + _FLOW * flow + CONNECTION] != NONE:
-        tcp.begin(now, cells[at.flows + _FLOW * flow + CONNECTION], cells, at)
+        tcp.begin_or_end(now, cells[at.flows + _FLOW * flow + CONNECTION], cells, at)
     elif cells[row + SIZE_STREAM] == NONE:
-        enter(now, flow, 0, cells, at)
+        enter(now, flow, cells[row + SENT], cells, at)
     else:
-        enter_datagram(now, flow, 0, take(cells[row + SIZE_STREAM], cells, at), cells, at)
+        enter_datagram(
+            now, flow, cells[row + SENT], take(cells[row + SIZE_STREAM], cells, at), cells, at
+        )
     next_ns = now + take(cells[row + GAP_STREAM], cells, at)
     # The packet's own event is later in the heap's order, so this one still stands first.
-    size = cells[at.control + HEAP_SIZE]
+    events = cells[at.control + HEAP_SIZE]
     item = item_of(CROSS, number)
-    replace_first(cells, at.heap, size, next_ns, next_order(cells, at), item)
+    replace_first(cells, at.heap, events, next_ns, next_order(cells, at), item)
 
 
 @compiled

@@ -85,13 +85,13 @@ USED, FIRST_DRAW = range(2)
 TIME, ORDER, ITEM = range(3)
 
 # packets inside the network, by slot; IP_BYTES only where packets of a flow differ in size.
-FLOW, SEQUENCE, HOP, LOST, IP_BYTES, NEXT = range(6)
+FLOW, SEQUENCE, HOP, LOST, IP_BYTES, NEXT, PART = range(7)
 
 # ended: PMU packets that have ended since they were last collected.
 END_TIME, END_FLOW, END_SEQUENCE, END_HOW = range(4)
 
 # taps: packets that have been put on a link that is listened to.
-TAP_TIME, TAP_PORT, TAP_FLOW, TAP_SEQUENCE, TAP_HOP, TAP_BYTES = range(6)
+TAP_TIME, TAP_PORT, TAP_FLOW, TAP_SEQUENCE, TAP_HOP, TAP_PART, TAP_BYTES = range(7)
 
 # connections: see tcp.py.
 CONNECTION_COLUMNS = 24
@@ -117,7 +117,7 @@ COLUMNS = {
     "packets": 8,
     "free": 1,
     "ended": 4,
-    "taps": 6,
+    "taps": 7,
 }
 GROWING = ("heap", "packets", "free", "ended", "taps")
 

@@ -26,6 +26,7 @@ from tieline.network.packet.memory import (
     LOST,
     NO_PORT,
     NONE,
+    PART,
     PROCESSING,
     PROCESSING_STREAM,
     SENT,
@@ -61,12 +62,13 @@ def enter_datagram(now: int, flow: int, sequence: int, size: int, cells: Cells, 
     hop = cells[row + FIRST_HOP]
     piece = cells[row + FRAGMENT]
     if piece == NONE or size <= piece:
-        _start(now, flow, sequence, hop, size + IP_HEADER, cells, at)
+        _start(now, flow, sequence, 0, hop, size + IP_HEADER, cells, at)
         return
-    left = size
-    while left > 0:
-        _start(now, flow, sequence, hop, min(left, piece) + IP_HEADER, cells, at)
-        left -= piece
+    part = 0
+    while part * piece < size:
+        length = min(size - part * piece, piece)
+        _start(now, flow, sequence, part, hop, length + IP_HEADER, cells, at)
+        part += 1
 
 
 @compiled
@@ -78,7 +80,7 @@ def copy_to_forks(
     for fork in range(cells[plan + FIRST_FORK], cells[plan + END_FORKS]):
         target = cells[at.forks + fork]
         if target >= 0:
-            _put_on_link(now, flow, sequence, target, size, cells, at)
+            _put_on_link(now, flow, sequence, 0, target, size, cells, at)
         else:
             record_end(now, -1 - target, sequence, DELIVERED, cells, at)
 
@@ -123,12 +125,12 @@ def drop_reason(refusal: int) -> int:
 
 @compiled
 def _start(
-    now: int, flow: int, sequence: int, hop: int, size: int, cells: Cells, at: Layout
+    now: int, flow: int, sequence: int, part: int, hop: int, size: int, cells: Cells, at: Layout
 ) -> None:
     """A packet of `size` IP bytes begins its route."""
     port = cells[at.hops + HOP_COLUMNS * hop + HOP_PORT]
     if port >= 0:
-        _put_on_link(now, flow, sequence, hop, size, cells, at)
+        _put_on_link(now, flow, sequence, part, hop, size, cells, at)
     elif port == NO_PORT:
         record_end(now, flow, sequence, DELIVERED, cells, at)
     else:
@@ -137,7 +139,7 @@ def _start(
 
 @compiled
 def _put_on_link(
-    now: int, flow: int, sequence: int, hop: int, size: int, cells: Cells, at: Layout
+    now: int, flow: int, sequence: int, part: int, hop: int, size: int, cells: Cells, at: Layout
 ) -> None:
     """A new packet, or a copy of one, goes on its first link."""
     if at.pmu_flows <= flow < at.first_tree:
@@ -148,6 +150,7 @@ def _put_on_link(
     cells[packet + SEQUENCE] = sequence
     cells[packet + LOST] = 0
     cells[packet + IP_BYTES] = size
+    cells[packet + PART] = part
     arrival_ns = transmit(now, slot, hop, cells, at)
     if arrival_ns in (DROPPED_AT_QUEUE, DROPPED_AT_CUT):
         dropped(now, flow, sequence, hop, drop_reason(arrival_ns), cells, at)

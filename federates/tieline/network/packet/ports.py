@@ -49,6 +49,7 @@ from tieline.network.packet.memory import (
     NONE,
     OVERHEAD,
     PACKETS,
+    PART,
     PEER,
     PER_BIT,
     PROPAGATION,
@@ -67,6 +68,7 @@ from tieline.network.packet.memory import (
     TAP_BYTES,
     TAP_FLOW,
     TAP_HOP,
+    TAP_PART,
     TAP_PORT,
     TAP_SEQUENCE,
     TAP_TIME,
@@ -233,9 +235,11 @@ def _transmit_special(now: int, slot: int, hop: int, cells: Cells, at: Layout) -
     service_ns = cells[plan + HOP_SERVICE]
     if service_ns == NONE:
         service_ns = _service_ns(size, port, cells)
-    if is_full or (
-        special & HAS_RED != 0 and is_dropped_early(now, waiting, service_ns, port, cells, at)
-    ):
+    # Every packet that comes counts in the average of early detection, also at a full queue.
+    is_early = special & HAS_RED != 0 and is_dropped_early(
+        now, waiting, service_ns, port, cells, at
+    )
+    if is_full or is_early:
         cells[port + QUEUE_DROPS] += 1
         return DROPPED_AT_QUEUE
     if start_ns > now:
@@ -265,6 +269,7 @@ def _reach(
         cells[record + TAP_FLOW] = cells[packet + FLOW]
         cells[record + TAP_SEQUENCE] = cells[packet + SEQUENCE]
         cells[record + TAP_HOP] = hop
+        cells[record + TAP_PART] = cells[packet + PART]
         cells[record + TAP_BYTES] = size - cells[port + OVERHEAD]
         cells[at.control + TAPPED] += 1
     return arrival_ns

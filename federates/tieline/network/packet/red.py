@@ -37,7 +37,9 @@ def is_dropped_early(
     average = cells[row + RED_AVERAGE]
     idle_ns = now - cells[port + FREE_AT]
     if idle_ns > 0:
-        average = (average * _decayed(idle_ns // max(1, service_ns), row, cells)) >> _BITS
+        # An average is up to 2^37: its share is taken to 20 bits, so that no product overflows.
+        left = _decayed(idle_ns // max(1, service_ns), row, cells) >> (_BITS - 20)
+        average = (average * left) >> 20
     else:
         average += (waiting * ONE_PACKET - average) >> cells[row + RED_SHIFT]
     cells[row + RED_AVERAGE] = average
@@ -49,11 +51,11 @@ def is_dropped_early(
         cells[row + RED_COUNT] = 0
         return True
     cells[row + RED_COUNT] += 1
-    share = cells[row + RED_PROBABILITY] * (average - low) // (high - low)
+    share = (cells[row + RED_PROBABILITY] * (((average - low) << 20) // (high - low))) >> 20
     # P = share / (1 - count share), so that the packets between two drops are spread evenly.
-    left = CERTAIN - cells[row + RED_COUNT] * share
+    spread = CERTAIN - cells[row + RED_COUNT] * share
     draw = take(cells[row + RED_STREAM], cells, at)
-    if left <= 0 or (draw * left) >> _BITS < share:
+    if spread <= 0 or (draw * spread) >> _BITS < share:
         cells[row + RED_COUNT] = 0
         return True
     return False

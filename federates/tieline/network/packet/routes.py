@@ -19,8 +19,8 @@ from tieline.network.traffic.base import (
     Sized,
 )
 
-TCP_HEADER = 32
-"""With the time-stamp option (RFC 7323)."""
+TCP_HEADER = 20
+"""Without options."""
 
 LEAST_MTU = 68
 """Every link takes packets of so many bytes (RFC 791); a PMU frame is 62 of them."""
@@ -53,11 +53,16 @@ class Routes:
         first_tree: the first flow that is a tree.
         back_of: the flow of replies to a cross flow.
         connections: in the order of their data flows.
+        places: of each hop, how many links lie before it on its route.
+        carried: of each flow but trees, the PMU or cross flow that it serves, and whether it goes
+            back to that flow's source.
         most_pieces: the most packets that a datagram is sent in.
-        reroutes: for each `Reroute` of the spec, in order, (flow, first hop) of what it changes.
+        reroutes: for each `Reroute` of the spec, in order, (flow, first hop, most of a datagram in
+            a packet or `NONE`) of what it changes.
 
     Raises:
-        InputError: a link's MTU is too small, or a segment of a connection exceeds it.
+        InputError: a link's MTU is too small, or a segment of a connection or a request that is
+            answered exceeds it.
     """
 
     def __init__(self, spec: NetworkSpec) -> None:
@@ -75,8 +80,11 @@ class Routes:
         self.connections: list[Connection] = []
         self.back_of: dict[int, int] = {}
         self.most_pieces = 1
+        self.places: list[int] = []
+        self.carried: list[tuple[int, bool]] = []
         self._loads: list[Load] = []
         self._frames = Load(FRAME_BYTES + UDP_HEADER, spec.dscp)
+        self._ways = {number: flow.route for number, flow in enumerate(spec.flows)}
         self._add_pmu_flows()
         self._add_cross_flows()
         if spec.transport == "tcp":
@@ -89,7 +97,7 @@ class Routes:
 
     def _add_pmu_flows(self) -> None:
         for flow in self._spec.flows:
-            self._add_flow(flow.route, self._frames, flow.destination)
+            self._add_flow(flow.route, self._frames, (len(self.flows), False), flow.destination)
 
     def _add_cross_flows(self) -> None:
         backs: list[tuple[int, Route, Load]] = []
@@ -99,15 +107,16 @@ class Routes:
             header = TCP_HEADER if is_connection else UDP_HEADER
             is_sized = isinstance(traffic, Sized)
             load = Load(traffic.payload_bytes + header, cross.dscp, is_sized)
-            self._add_flow(cross.route, load)
+            self._add_flow(cross.route, load, (number, False))
             if is_connection:
                 backs.append((number, cross.way_back, Load(TCP_HEADER, cross.dscp)))
             elif isinstance(traffic, Answered):
+                self._check_whole(number, self.flows[number][4], "request")
                 answer = Load(traffic.reply_bytes + UDP_HEADER, cross.dscp)
                 backs.append((number, cross.way_back, answer))
         for number, route, load in backs:
             self.back_of[number] = len(self.flows)
-            self._add_flow(route, load)
+            self._add_flow(route, load, (number, True))
             traffic = self._spec.cross_flows[number - len(self._spec.flows)].traffic
             if isinstance(traffic, Acknowledged):
                 self._connect(number, self.back_of[number], NONE, traffic.window_segments)
@@ -118,8 +127,9 @@ class Routes:
             if len(flow.route) == 1:
                 continue
             data = len(self.flows)
-            self._add_flow(flow.route, Load(FRAME_BYTES + TCP_HEADER, self._spec.dscp))
-            self._add_flow(flow.route[::-1], Load(TCP_HEADER, self._spec.dscp))
+            segment, ack = FRAME_BYTES + TCP_HEADER, TCP_HEADER
+            self._add_flow(flow.route, Load(segment, self._spec.dscp), (number, False))
+            self._add_flow(flow.route[::-1], Load(ack, self._spec.dscp), (number, True))
             self._connect(data, data + 1, number, FRAME_WINDOW)
 
     def _connect(self, data: int, ack: int, frames_of: int, window: int) -> None:
@@ -129,15 +139,22 @@ class Routes:
                 first_hop, destination, _, datagram, piece = self.flows[flow]
                 self.flows[flow] = (first_hop, destination, connection, datagram, piece)
         for flow in (data, ack):
-            if self.flows[flow][4] != NONE:
-                raise InputError(
-                    f"a segment of {self.flows[flow][3] + IP_HEADER} bytes exceeds the MTU of a "
-                    "link on its route: lower its payload"
-                )
+            self._check_whole(flow, self.flows[flow][4], "segment")
         self.connections.append(Connection(data, ack, frames_of, window))
 
-    def _add_flow(self, route: Route, load: Load, destination: int = NONE) -> None:
+    def _check_whole(self, flow: int, piece: int, kind: str) -> None:
+        """Raise InputError if a flow's packets go in pieces: nothing puts them together again."""
+        if piece != NONE:
+            raise InputError(
+                f"a {kind} of {self._loads[flow].datagram + IP_HEADER} bytes exceeds the MTU of a "
+                "link on its route: lower its payload"
+            )
+
+    def _add_flow(
+        self, route: Route, load: Load, carried: tuple[int, bool], destination: int = NONE
+    ) -> None:
         hop, piece = self._path(route, load)
+        self.carried.append(carried)
         self.flows.append((hop, destination, NONE, load.datagram, piece))
         self._loads.append(load)
 
@@ -153,6 +170,7 @@ class Routes:
         for pair in pairwise(route):
             self.hops.append(self._hop(pair, load, is_sized=load.is_sized or piece != NONE))
         self.hops.append((NO_PORT, 0, 0, 0, 0, 0))
+        self.places += range(len(route))
         return first, piece
 
     def _hop(
@@ -208,34 +226,40 @@ class Routes:
                 route = ordered[low][0]
                 pair = (route[depth], route[depth + 1])
                 self.hops.append(self._hop(pair, self._frames, base + low, base + high))
+                self.places.append(depth)
                 depth += 1
                 ends, branches = _at_node(ordered, low, high, depth)
             first = len(self.forks)
             self.forks += [-1 - flow for flow in ends] + [NONE] * len(branches)
             self.hops.append((FORK, first, len(self.forks), 0, 0, 0))
+            self.places.append(depth)
             for place, (branch_low, branch_high) in enumerate(branches):
                 pending.append((branch_low, branch_high, depth, first + len(ends) + place))
         return root
 
-    def _rerouted(self, change: Reroute) -> list[tuple[int, int]]:
-        """Add the hops of other routes; return each flow that takes one, and its first hop."""
+    def _rerouted(self, change: Reroute) -> list[tuple[int, int, int]]:
+        """Add the hops of other routes; return each flow that takes one, as `reroutes` has it."""
         moved: dict[int, Route] = dict(change.routes)
-        moved |= {self.back_of[flow]: way for flow, way in change.ways_back.items()}
+        ways_back = change.ways_back.items()
+        moved |= {self.back_of[flow]: way for flow, way in ways_back if flow in self.back_of}
         for connection in self.connections:
-            if connection.frames_of in moved:
-                route = moved[connection.frames_of]
+            if connection.frames_of in change.routes:
+                route = change.routes[connection.frames_of]
                 moved |= {connection.data_flow: route, connection.ack_flow: route[::-1]}
-        hops = [(flow, self._path(route, self._loads[flow])[0]) for flow, route in moved.items()]
+        hops = [(flow, *self._path(route, self._loads[flow])) for flow, route in moved.items()]
+        segments = {flow for pair in self.connections for flow in pair[:2]}
+        for flow, _, piece in hops:
+            if flow in segments or flow in self.back_of:
+                self._check_whole(flow, piece, "segment" if flow in segments else "request")
         return hops + self._trees_moved(change.routes)
 
-    def _trees_moved(self, routes: Mapping[int, Route]) -> list[tuple[int, int]]:
+    def _trees_moved(self, routes: Mapping[int, Route]) -> list[tuple[int, int, int]]:
         hops = []
+        self._ways |= {flow: way for flow, way in routes.items() if flow in self._ways}
         for first, end, tree in self.sources:
             own = range(first, end)
             if tree != NONE and any(flow in routes for flow in own):
-                flows = self._spec.flows
-                ways = [(routes.get(flow, flows[flow].route), flow) for flow in own]
-                hops.append((tree, self._tree(ways)))
+                hops.append((tree, self._tree([(self._ways[flow], flow) for flow in own]), NONE))
         return hops
 
 

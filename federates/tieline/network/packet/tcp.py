@@ -52,11 +52,14 @@ _RECEIVED = COLUMNS["received"]
 
 
 @compiled
-def begin(now: int, connection: int, cells: Cells, at: Layout) -> None:
-    """A connection with endless data begins to send."""
+def begin_or_end(now: int, connection: int, cells: Cells, at: Layout) -> None:
+    """A connection with endless data begins to send; the second time, it sends nothing new."""
     row = at.connections + CONNECTION_COLUMNS * connection
-    cells[row + AVAILABLE] = ENDLESS
-    _send_what_fits(now, connection, cells, at)
+    if cells[row + AVAILABLE] == 0:
+        cells[row + AVAILABLE] = ENDLESS
+        _send_what_fits(now, connection, cells, at)
+    else:
+        cells[row + AVAILABLE] = cells[row + SENT_SO_FAR]
 
 
 @compiled
@@ -93,7 +96,9 @@ def on_timer(now: int, connection: int, cells: Cells, at: Layout) -> None:
         _plan_timer(deadline, connection, cells, at)
     elif deadline > 0:
         under_way = cells[row + NEXT_SEGMENT] - cells[row + UNACKNOWLEDGED]
-        cells[row + THRESHOLD] = max(under_way * UNIT // 2, 2 * UNIT)
+        # A segment that the timer sends a second time leaves the threshold (RFC 5681, section 3.1).
+        if cells[row + WINDOW] > UNIT:
+            cells[row + THRESHOLD] = max(under_way * UNIT // 2, 2 * UNIT)
         cells[row + WINDOW] = UNIT
         cells[row + WAIT] = min(2 * cells[row + WAIT], MOST_WAIT_NS)
         cells[row + NEXT_SEGMENT] = cells[row + UNACKNOWLEDGED]

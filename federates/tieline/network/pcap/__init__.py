@@ -1,5 +1,6 @@
 """Captures of links for Wireshark, and recorded traffic for replay."""
 
+from tieline.network.engine import TAP
 from tieline.network.pcap.addresses import (
     FLOW_ADDRESS,
     TCP,
@@ -9,7 +10,6 @@ from tieline.network.pcap.addresses import (
     hosts_text,
 )
 from tieline.network.pcap.capture import Capture, stream_configurations
-from tieline.network.pcap.frames import TAP
 from tieline.network.pcap.reader import PacketTrace, read_pcap
 from tieline.network.pcap.writer import PcapWriter
 

@@ -24,8 +24,9 @@ from numpy.typing import NDArray
 
 from tieline.c37118.batch import stream_config
 from tieline.errors import CosimError, InputError
+from tieline.network.engine import TAP
 from tieline.network.pcap.addresses import AddressPlan
-from tieline.network.pcap.frames import TAP, LinkFrames, PayloadOf
+from tieline.network.pcap.frames import LinkFrames, PayloadOf
 from tieline.network.pcap.writer import Group, PcapWriter
 from tieline.network.spec import NetworkSpec
 

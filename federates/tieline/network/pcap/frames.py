@@ -1,7 +1,7 @@
 """Turns records of packets on a link into the bytes of their Ethernet frames."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,25 +22,6 @@ from tieline.network.pcap.headers import (
 )
 from tieline.network.pcap.writer import Group
 from tieline.network.spec import NetworkSpec
-
-TAP = np.dtype(
-    [
-        ("sent_ns", "<i8"),
-        ("port", "<i4"),
-        ("flow", "<i4"),
-        ("sequence", "<i4"),
-        ("hop", "<i4"),
-        ("part", "<i4"),
-        ("bytes", "<i4"),
-    ]
-)
-"""A packet that goes on a link.
-
-`sent_ns` is when its first bit does; `port` the link's direction, as in `NetworkSpec.ports`; `flow`
-the number of the PMU flow, or their count plus that of the cross flow; `hop` the place of the link
-on the route, from 0; `part` the number of the fragment, from 0; `bytes` those from the IPv4 header
-on.
-"""
 
 FIRST_TTL = 255
 
@@ -141,7 +122,8 @@ class LinkFrames:
         """Return the columns (n, 5) of `_Shape`."""
         flows = self._plan.flows[records["flow"]]
         piece = records["bytes"].astype(np.int64) - IPV4.itemsize
-        most = flows["fragment_bytes"].astype(np.int64)
+        # Replies and acknowledgements are never fragmented, and as large as they are.
+        most = np.where(records["is_back"], 0, flows["fragment_bytes"].astype(np.int64))
         is_tcp = flows["protocol"] == TCP
         header = np.where(is_tcp, _header_bytes(True), _header_bytes(False))
         whole = np.where(most > 0, header + flows["payload_bytes"], piece)
@@ -157,7 +139,7 @@ class LinkFrames:
                 f"{flows['payload_bytes'][at]} bytes in fragments of {most[at]} (0: none): "
                 f"{records[at]}"
             )
-        is_pmu = records["flow"] < self._plan.pmu_flows
+        is_pmu = (records["flow"] < self._plan.pmu_flows) & (records["is_back"] == 0)
         return np.column_stack([is_pmu, is_tcp, whole, first, end]).astype(np.int64)
 
     def _payload(
@@ -184,8 +166,9 @@ class LinkFrames:
     ) -> NDArray[np.uint8]:
         """Return frames (n, size); `begins` (n,) are the numbers of the first bytes over TCP."""
         flows = self._plan.flows[records["flow"]]
-        ends = (flows["source_ip"], flows["target_ip"])
-        sockets = (*ends, flows["source_port"], flows["target_port"])
+        back = records["is_back"] == 1
+        ends = _either(back, flows["source_ip"], flows["target_ip"])
+        sockets = (*ends, *_either(back, flows["source_port"], flows["target_port"]))
         if shape.is_tcp:
             whole = tcp_segments(payload, *sockets, begins)
         else:
@@ -202,8 +185,15 @@ class LinkFrames:
             offset_bytes=shape.first,
         )
         is_back = records["port"] - self._first_port
-        to = target_mac(flows["target_ip"], self._ends[1 - is_back])
+        to = target_mac(ends[1], self._ends[1 - is_back])
         return ethernet_frames(packets, self._macs[is_back], to)
+
+
+def _either(
+    is_back: NDArray[np.bool_], source: NDArray[Any], target: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return source and target of packets, of which some go back."""
+    return np.where(is_back, target, source), np.where(is_back, source, target)
 
 
 def _header_bytes(is_tcp: int) -> int:

@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from tieline.network.entry import Entry
 from tieline.network.queues.base import NO_LIMIT
-from tieline.network.queues.drop_tail import MOST_PACKETS
+from tieline.network.queues.drop_tail import MOST_BYTES, MOST_PACKETS
 
 MOST_DSCP = 63
 
@@ -24,7 +24,7 @@ class ClassEntry(Entry):
 
     dscp: list[int] = Field(default_factory=list, description="DSCPs of this class")
     packets: int = Field(ge=1, le=MOST_PACKETS, strict=True, description="limit")
-    bytes: int = Field(NO_LIMIT, ge=1, strict=True, description="limit")
+    bytes: int = Field(NO_LIMIT, ge=1, le=MOST_BYTES, strict=True, description="limit")
 
     @model_validator(mode="after")
     def _known(self) -> "ClassEntry":

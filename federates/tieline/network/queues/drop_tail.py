@@ -9,8 +9,10 @@ from tieline.network.entry import Entry
 from tieline.network.queues.base import NO_LIMIT, EarlyDetection, Queue, WaitingLine
 
 MOST_PACKETS = 100_000
+MOST_BYTES = 1 << 30
 LEAST_PACKET_BYTES = 29
-"""An IPv4 packet of UDP with one byte of payload: a byte limit never holds more than fit of it."""
+"""An IPv4 packet of UDP with one byte of payload: a byte limit has room for as many as fit of it,
+up to `MOST_PACKETS`."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,13 @@ class DropTailEntry(Entry):
 
     discipline: Literal["drop_tail"]
     packets: int | None = Field(None, ge=1, le=MOST_PACKETS, strict=True, description="limit")
-    bytes: int | None = Field(None, ge=1, le=1 << 30, strict=True, description="limit")
+    bytes: int | None = Field(
+        None,
+        ge=1,
+        le=MOST_BYTES,
+        strict=True,
+        description=f"limit; without 'packets' no more than {MOST_PACKETS} packets wait either",
+    )
 
     @model_validator(mode="after")
     def _limited(self) -> "DropTailEntry":

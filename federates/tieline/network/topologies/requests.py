@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from tieline.errors import InputError
-from tieline.network.schema import MAX_QUEUE
+from tieline.network.queues.drop_tail import MOST_PACKETS
 from tieline.network.topologies.centres import Traffic
 from tieline.network.topologies.draft import LinkDefaults
 from tieline.network.topologies.hierarchical import Rates
@@ -44,8 +44,8 @@ def link_defaults(
     Raises:
         InputError: a value out of its bounds, or both a propagation and a distance.
     """
-    if not 1 <= queue <= MAX_QUEUE:
-        raise InputError(f"--queue must be from 1 to {MAX_QUEUE} packets (got {queue})")
+    if not 1 <= queue <= MOST_PACKETS:
+        raise InputError(f"--queue must be from 1 to {MOST_PACKETS} packets (got {queue})")
     if not 0 <= overhead <= 1000:
         raise InputError(f"--overhead must be from 0 to 1000 bytes (got {overhead})")
     if propagation is not None and distance is not None:

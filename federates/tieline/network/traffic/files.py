@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from tieline.network.draws import NEVER, Chunk, Chunks, chunked
+from tieline.network.draws import CHUNK, NEVER, Chunk, Chunks, chunked
 from tieline.network.traffic.base import HEADER_BYTES, FlowEntry, Payload, Rate, Traffic
 from tieline.units import NS_PER_S, Seconds, seconds_to_ns
 
@@ -49,14 +49,16 @@ class Files:
 
     def _parts(self, generator: np.random.Generator) -> Iterator[Chunk]:
         gap_ns = (self.payload_bytes + HEADER_BYTES) * 8 * NS_PER_S / self.pace_bps
-        within = np.rint(np.arange(self.datagrams) * gap_ns).astype(np.int64)
         length_ns = round(self.datagrams * gap_ns)
         asked_ns, free_ns, last_ns = 0.0, 0, 0
         while True:
             asked_ns += generator.standard_exponential() * self.interval_ns
             start_ns = max(free_ns, round(asked_ns))
-            yield np.diff(start_ns + within, prepend=last_ns)
-            last_ns = start_ns + int(within[-1])
+            for first in range(0, self.datagrams, CHUNK):
+                numbers = np.arange(first, min(first + CHUNK, self.datagrams))
+                instants = start_ns + np.rint(numbers * gap_ns).astype(np.int64)
+                yield np.diff(instants, prepend=last_ns)
+                last_ns = int(instants[-1])
             free_ns = start_ns + length_ns
 
 

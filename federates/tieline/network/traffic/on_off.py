@@ -11,11 +11,14 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from tieline.network.draws import CHUNK, NEVER, Chunk, Chunks, chunked
 from tieline.network.traffic.base import HEADER_BYTES, FlowEntry, Payload, Rate, Traffic
 from tieline.units import NS_PER_S, Seconds, seconds_to_ns
+
+MOST_PERIODS = 1000
+"""Mean times on from one datagram to the next: all of them are drawn to find it."""
 
 
 @dataclass(frozen=True)
@@ -60,11 +63,12 @@ class OnOff:
             on_until = on_before + np.cumsum(self._times(generator, self.on_ns))
             off_until = off_before + np.cumsum(self._times(generator, self.off_ns))
             end = int(on_until[-1] // gap_ns)
-            on_at = np.arange(count + 1, end + 1) * gap_ns
-            off_at = off_until[np.minimum(np.searchsorted(on_until, on_at), len(off_until) - 1)]
-            instants = np.rint(on_at + off_at).astype(np.int64)
-            yield np.diff(instants, prepend=last_ns)
-            last_ns = int(instants[-1]) if len(instants) else last_ns
+            for first in range(count + 1, end + 1, CHUNK):
+                on_at = np.arange(first, min(first + CHUNK, end + 1)) * gap_ns
+                off_at = off_until[np.minimum(np.searchsorted(on_until, on_at), CHUNK - 1)]
+                instants = np.rint(np.minimum(on_at + off_at, NEVER)).astype(np.int64)
+                yield np.diff(instants, prepend=last_ns)
+                last_ns = int(instants[-1])
             count, on_before, off_before = end, float(on_until[-1]), float(off_until[-1])
 
     def _times(self, generator: np.random.Generator, mean_ns: float) -> NDArray[np.float64]:
@@ -80,13 +84,24 @@ class OnOffEntry(FlowEntry):
     kind: Literal["on_off"]
     rate: Rate = Field(description="rate while on, of payload, UDP and IPv4 headers")
     payload: Payload
-    on: Seconds = Field(gt=0, le=1e4, description="mean time on")
-    off: Seconds = Field(gt=0, le=1e4, description="mean time off")
+    # Not `on` and `off`, which YAML 1.1 takes for true and false.
+    mean_on: Seconds = Field(gt=0, le=1e4, description="mean time on")
+    mean_off: Seconds = Field(gt=0, le=1e4, description="mean time off")
     shape: float | None = Field(
         None, gt=1, le=10, description="shape of Pareto times; none: exponential times"
     )
 
+    @model_validator(mode="after")
+    def _sends(self) -> "OnOffEntry":
+        gap_s = (self.payload + HEADER_BYTES) * 8 / self.rate
+        if gap_s > MOST_PERIODS * self.mean_on:
+            raise ValueError(
+                f"'mean_on' must be at least 1/{MOST_PERIODS} of the {gap_s:g} s from datagram to "
+                f"datagram (got {self.mean_on:g} s)"
+            )
+        return self
+
     def traffic(self) -> Traffic:
         """Return the traffic."""
-        on_ns, off_ns = seconds_to_ns(self.on), seconds_to_ns(self.off)
+        on_ns, off_ns = seconds_to_ns(self.mean_on), seconds_to_ns(self.mean_off)
         return OnOff(self.rate, self.payload, on_ns, off_ns, self.shape)

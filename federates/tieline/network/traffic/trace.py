@@ -74,7 +74,7 @@ def read_trace(path: Path) -> Trace:
             for row in rows:
                 where = f"{path}:{rows.line_num}"
                 times.append(seconds_to_ns(_number(where, row, "time_s", 0.0, 1e9)))
-                payloads.append(int(_number(where, row, "payload_bytes", 1, MOST_PAYLOAD)))
+                payloads.append(_whole(where, row, "payload_bytes", 1, MOST_PAYLOAD))
                 if times[-1] < max(times[-2:]):
                     raise ValueError(
                         f"{where}: 'time_s' must not be before the line above "
@@ -95,6 +95,13 @@ def _number(where: str, row: dict[str, str], name: str, low: float, high: float)
             f"{where}: '{name}' must be >= {low:g} and <= {high:g} (got {row[name]!r})"
         )
     return value
+
+
+def _whole(where: str, row: dict[str, str], name: str, low: int, high: int) -> int:
+    value = _number(where, row, name, low, high)
+    if not value.is_integer():
+        raise ValueError(f"{where}: '{name}' must be a whole number (got {row[name]!r})")
+    return int(value)
 
 
 def _trace_of(value: Any, info: ValidationInfo) -> Trace:
