@@ -13,6 +13,7 @@ from tieline.experiment.load import Study
 from tieline.experiment.schema import Experiment
 from tieline.experiment.sites import Sites, Survey, survey
 from tieline.experiment.sweep import Point
+from tieline.network.settings import PACKET_ENGINES
 from tieline.problems import near
 from tieline.resources import case_folder, shipped
 
@@ -170,7 +171,7 @@ _NOT_BY_NAME = ("case", "network")
 
 
 def _topology(experiment: Experiment, folder: Path, beside: Path) -> Path | None:
-    if experiment.network.engine != "packet":
+    if experiment.network.engine not in PACKET_ENGINES:
         return None
     name = experiment.network.topology
     places = [beside / name, Path(name), folder / f"{name}.yaml", folder / name]

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictInt
 
 from tieline.cosim.interfaces import FederationSettings
 from tieline.grid.settings import GridSettings
-from tieline.network.settings import NetworkSettings
+from tieline.network.settings import PACKET_ENGINES, NetworkSettings
 from tieline.problems import Path, Problem
 from tieline.wams.settings import WamsSettings
 
@@ -58,8 +58,8 @@ def without_effect(experiment: Experiment) -> list[Problem]:
     network = experiment.network
     readers = {
         "delay": ("constant", "helics-filters"),
-        "mean_delay": ("packet",),
-        "loss": ("packet", "empirical", "helics-filters"),
+        "mean_delay": PACKET_ENGINES,
+        "loss": (*PACKET_ENGINES, "empirical", "helics-filters"),
         "empirical": ("empirical",),
     }
     return [

@@ -156,20 +156,29 @@ class Engine(Protocol):
 
     lookahead_ns: int
 
-    def send(self, measured_ns: int, sources: NDArray[np.int64], sequence: int) -> None:
+    def send(
+        self,
+        measured_ns: int,
+        sources: NDArray[np.int64],
+        sequence: int,
+        payloads: NDArray[np.uint8] | None = None,
+    ) -> None:
         """Take the frames that some sources measured at one instant.
 
         Args:
             measured_ns: the instant of measurement.
             sources: their numbers, ascending.
             sequence: the number of the frame; each source sends each number once.
+            payloads: (sources, size) the bytes of the frames. An engine that carries bytes compares
+                what arrives with them, so that the frames handed over are those that travelled;
+                the others leave them alone.
         """
 
     def run_until(self, until_ns: int) -> Outcome:
         """Return what ended after the last call and up to and including `until_ns`.
 
         Raises:
-            CosimError: packets are not all accounted for.
+            CosimError: packets are not all accounted for, or a frame arrived with other bytes.
         """
 
     def counts(self) -> Counts:

@@ -11,9 +11,10 @@ from tieline.errors import CosimError, TimeContractBroken
 from tieline.network.captures import Captures
 from tieline.network.engine import Engine, Outcome, joined
 from tieline.network.linkless import open_without_links
+from tieline.network.ns3 import Ns3Engine
 from tieline.network.packet import PacketEngine
 from tieline.network.recorder import Recorder
-from tieline.network.settings import NetworkSettings
+from tieline.network.settings import PACKET_ENGINES, NetworkSettings
 from tieline.network.spec import FRAME_BYTES, NetworkSpec
 from tieline.network.topology import network_spec
 from tieline.units import seconds_to_ns
@@ -23,18 +24,20 @@ def open_participant(run: dict[str, Any], folder: Path) -> "NetworkParticipant":
     """Return the network of a run file's content, whose results go to `folder`.
 
     Raises:
-        InputError: the topology is faulty, or a setting that the engine needs is missing.
+        InputError: the topology is faulty, a setting that the engine needs is missing, or ns-3 is
+            not installed or cannot carry the network.
     """
     stated = run["network"]
     settings = NetworkSettings.model_validate({**stated, "topology": stated["topology"] or "case"})
-    is_packet = settings.engine == "packet"
-    topology = Path(settings.topology) if is_packet else None
-    spec = network_spec(settings, topology, run["sources"], run["destinations"])
+    sites = (run["sources"], run["destinations"])
+    topology = Path(settings.topology) if settings.engine in PACKET_ENGINES else None
+    spec = network_spec(settings, topology, *sites)
     engine: Engine
-    if is_packet:
+    if settings.engine == "packet":
         engine = PacketEngine(spec, run["seed"])
+    elif settings.engine == "ns3":
+        engine = Ns3Engine(spec, run["seed"])
     else:
-        sites = (run["sources"], run["destinations"])
         engine = open_without_links(settings, spec, *sites, run["seed"])
     clock = Clock(**run["clock"])
     window_s = settings.series_window
@@ -91,7 +94,7 @@ class NetworkParticipant:
         self._check(k, bundle)
         sources = np.arange(len(bundle.payloads))
         if len(sources):
-            self._engine.send(bundle.measured_ns, sources, k)
+            self._engine.send(bundle.measured_ns, sources, k, bundle.payloads)
             self._recorder.add_sent(sources, k)
             self._frames.keep(k, bundle.payloads)
         return self._carry(k + self._clock.lead)

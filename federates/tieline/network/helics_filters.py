@@ -69,8 +69,14 @@ class HelicsFilters:
         self._now_ns = -1
         self._sent = self._delivered = self._dropped = 0
 
-    def send(self, measured_ns: int, sources: NDArray[np.int64], sequence: int) -> None:
-        """Take the frames of one instant.
+    def send(
+        self,
+        measured_ns: int,
+        sources: NDArray[np.int64],
+        sequence: int,
+        payloads: NDArray[np.uint8] | None = None,
+    ) -> None:
+        """Take the frames of one instant; their bytes stay here.
 
         Raises:
             CosimError: the last `run_until` has passed it.

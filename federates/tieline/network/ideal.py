@@ -35,8 +35,14 @@ class ConstantDelay:
         self._sent = 0
         self._delivered = 0
 
-    def send(self, measured_ns: int, sources: NDArray[np.int64], sequence: int) -> None:
-        """Take the frames of one instant.
+    def send(
+        self,
+        measured_ns: int,
+        sources: NDArray[np.int64],
+        sequence: int,
+        payloads: NDArray[np.uint8] | None = None,
+    ) -> None:
+        """Take the frames of one instant; their bytes stay here.
 
         Raises:
             CosimError: the last `run_until` has passed the instant at which they arrive.

@@ -9,6 +9,9 @@ from tieline.network.schema import JitterEntry
 from tieline.network.spec import Transport
 from tieline.units import Seconds
 
+PACKET_ENGINES = ("packet", "ns3")
+"""The engines that simulate every packet of a topology."""
+
 MAX_DELAY_S = 10.0
 """Longest delay that a setting or a trace may have, s."""
 
@@ -65,11 +68,12 @@ class NetworkSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    engine: Literal["ideal", "constant", "empirical", "helics-filters", "packet"] = Field(
+    engine: Literal["ideal", "constant", "empirical", "helics-filters", "packet", "ns3"] = Field(
         "packet",
         description=(
             "ideal: no delay; constant: one delay for all; empirical: drawn or measured delays; "
-            "helics-filters: HELICS's own delay and random_drop; packet: a simulated network"
+            "helics-filters: HELICS's own delay and random_drop; packet: a simulated network; ns3: "
+            "the same network in the ns-3 simulator, which is an extra of its own"
         ),
     )
     delay: Seconds | None = Field(
@@ -90,7 +94,7 @@ class NetworkSettings(BaseModel):
         gt=0,
         le=10,
         description=(
-            "mean combined delay that the packet engine's processing times are lengthened to, s; "
+            "mean combined delay that the PMUs' processing times are lengthened to, s; "
             "none leaves the topology as it is"
         ),
     )

@@ -8,6 +8,7 @@ from tieline.errors import InputError
 from tieline.network.entries import Entries, Sites, jitter_of
 from tieline.network.events import changes_of, rerouted
 from tieline.network.linkless import least_delay_without_links_ns
+from tieline.network.ns3.limits import check_carried
 from tieline.network.routing import Router, Routing
 from tieline.network.settings import NetworkSettings
 from tieline.network.spec import (
@@ -55,15 +56,19 @@ def network_spec(
 
     Args:
         settings: engine, and what it needs.
-        topology: the file of the packet engine's network; None for the other engines.
+        topology: the file of the network of an engine that simulates packets; None for the others.
         sources: the PMUs, as for `read_topology`.
         destinations: the controllers, as for `read_topology`.
 
     Raises:
-        InputError: as `read_topology`, or the constant engine has no delay.
+        InputError: as `read_topology`, the constant engine has no delay, or ns-3 is not installed
+            or cannot carry the network.
     """
     if topology is not None:
-        return read_topology(topology, sources, destinations, settings)
+        spec = read_topology(topology, sources, destinations, settings)
+        if settings.engine == "ns3":
+            check_carried(spec)
+        return spec
     least_ns = least_delay_without_links_ns(settings, sources, destinations)
     return direct_spec(sources, destinations, least_ns)
 

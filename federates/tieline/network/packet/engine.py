@@ -5,22 +5,19 @@ from numpy.typing import NDArray
 
 from tieline.errors import CosimError
 from tieline.network.engine import (
-    ARRIVAL,
     DELIVERED,
-    DROP,
     LINK_DOWN,
     LOSS,
-    NO_ARRIVALS,
     QUEUE_FULL,
     Counts,
     LinkUse,
     Outcome,
     check_not_late,
-    in_order,
 )
 from tieline.network.packet import kernel, tcp
 from tieline.network.packet.build import Supplies, laid_out
 from tieline.network.packet.counters import read_counters
+from tieline.network.packet.endings import Endings
 from tieline.network.packet.events import CROSS, FRAME, KINDS
 from tieline.network.packet.memory import (
     ARRIVED,
@@ -28,11 +25,7 @@ from tieline.network.packet.memory import (
     BYTES,
     CHUNK,
     DOWN_DROPS,
-    END_FLOW,
-    END_HOW,
     END_MEMBERS,
-    END_SEQUENCE,
-    END_TIME,
     ENDED,
     FIRST_DRAW,
     FIRST_MEMBER,
@@ -81,21 +74,23 @@ class PacketEngine:
         self._memory, self._changes, routes = laid_out(spec, self._supplies)
         self._taps = Taps(self._memory, routes)
         self._pmus = [Pmu(source, seed) for source in spec.sources]
-        self._flow_ends = np.array(
-            [(flow.source, flow.destination) for flow in spec.flows], dtype=np.int64
-        ).reshape(-1, 2)
-        self._flows_of = np.bincount(self._flow_ends[:, 0], minlength=len(spec.sources))
+        self._endings = Endings(spec)
+        self._flows_of = self._endings.flows_of_sources()
         self.lookahead_ns = spec.lookahead_ns
         self._now_ns = -1
-        self._held = NO_ARRIVALS
         self._rows: list[NDArray[np.int64]] = []
         self._sent = 0
-        self._ended = np.zeros(4, dtype=np.int64)
         self._max_queue = np.zeros(len(spec.ports), dtype=np.int64)
         self._start_cross_flows()
 
-    def send(self, measured_ns: int, sources: NDArray[np.int64], sequence: int) -> None:
-        """Take the frames that some sources measured at one instant.
+    def send(
+        self,
+        measured_ns: int,
+        sources: NDArray[np.int64],
+        sequence: int,
+        payloads: NDArray[np.uint8] | None = None,
+    ) -> None:
+        """Take the frames that some sources measured at one instant; their bytes stay here.
 
         Raises:
             CosimError: the last `run_until` has passed the instant at which a frame may enter.
@@ -119,7 +114,8 @@ class PacketEngine:
             self._change()
         self._run_to(until_ns)
         self._now_ns = until_ns
-        outcome = self._outcome(until_ns)
+        outcome = self._endings.outcome(np.concatenate(self._rows), until_ns)
+        self._rows.clear()
         self.counts().check(until_ns)
         return outcome
 
@@ -130,14 +126,14 @@ class PacketEngine:
         connection from the hand-over to its delivery, besides the segments that carry it.
         """
         cross = self._memory.table("cross").sum(axis=0)
-        ended = self._ended + cross[ARRIVED:]
+        ended = self._endings.counts + cross[ARRIVED:]
         return Counts(
             sent=self._sent + int(cross[SENT]),
             delivered=int(ended[DELIVERED]),
             dropped_queue=int(ended[QUEUE_FULL]),
             dropped_loss=int(ended[LOSS]),
             dropped_down=int(ended[LINK_DOWN]),
-            in_flight=self._inside() + len(self._held) + self._frames_waiting(),
+            in_flight=self._inside() + self._endings.held + self._frames_waiting(),
         )
 
     def links(self) -> list[LinkUse]:
@@ -153,7 +149,7 @@ class PacketEngine:
                 bytes=rows[port][BYTES],
                 dropped_queue=rows[port][QUEUE_DROPS],
                 dropped_loss=rows[port][LOSS_DROPS],
-                busy_ns=rows[port][BUSY] - max(0, rows[port][FREE_AT] - self._now_ns),
+                busy_ns=rows[port][BUSY] - max(0, rows[port][FREE_AT] - max(0, self._now_ns)),
                 max_queue=max(before[port], rows[port][MAX_QUEUE]),
                 dropped_down=rows[port][DOWN_DROPS],
             )
@@ -181,7 +177,9 @@ class PacketEngine:
         """Return the counters of each link's directions, and begin a new span for `max_queue`."""
         ports = self._memory.table("ports")
         memory = self._memory
-        counters = read_counters(self._now_ns, len(ports), memory.cells, memory.layout)
+        # Before the first step, too, when nothing has been in transmission.
+        now_ns = max(0, self._now_ns)
+        counters = read_counters(now_ns, len(ports), memory.cells, memory.layout)
         np.maximum(self._max_queue, counters["max_queue"], out=self._max_queue)
         ports[:, MAX_QUEUE] = counters["queue"]
         return counters
@@ -268,26 +266,3 @@ class PacketEngine:
             draws[:CHUNK] = draws[CHUNK:]
             draws[CHUNK:] = next(self._supplies.chunks[number])
         self._memory.control[WANTS_DRAWS] = 0
-
-    def _outcome(self, until_ns: int) -> Outcome:
-        rows = np.concatenate(self._rows)
-        self._rows.clear()
-        is_delivered = rows[:, END_HOW] == DELIVERED
-        self._held = np.concatenate([self._held, self._records(rows[is_delivered], ARRIVAL)])
-        is_due = self._held["arrival_ns"] <= until_ns
-        arrivals = in_order(self._held[is_due])
-        self._held = self._held[~is_due]
-        drops = self._records(rows[~is_delivered], DROP)
-        drops["reason"] = rows[~is_delivered, END_HOW]
-        self._ended += np.bincount(drops["reason"], minlength=4)
-        self._ended[DELIVERED] += len(arrivals)
-        return Outcome(arrivals, drops)
-
-    def _records(self, rows: NDArray[np.int64], layout: "np.dtype[np.void]") -> NDArray[np.void]:
-        flows = rows[:, END_FLOW]
-        records = np.empty(len(rows), layout)
-        records[layout.names[0]] = rows[:, END_TIME]  # type: ignore[index]
-        records["source"] = self._flow_ends[flows, 0]
-        records["destination"] = self._flow_ends[flows, 1]
-        records["sequence"] = rows[:, END_SEQUENCE]
-        return records
