@@ -130,6 +130,7 @@ def run_for(folder: Path, intervals: int) -> None:
     sources, destinations = sites()
     run = {
         "seed": 1,
+        "frequency_hz": 60.0,
         "clock": {"rate_hz": 60, "intervals": intervals},
         "network": {"engine": "packet", "topology": str(CASE / "network.yaml")},
         "sources": sources,

@@ -237,6 +237,7 @@ def test_a_lead_beyond_the_lookahead_is_refused_at_the_first_late_frame(tmp_path
 def miniwecc_run(topology: Path, lead: int) -> dict[str, Any]:
     return {
         "seed": 5,
+        "frequency_hz": 60.0,
         "clock": {"rate_hz": 60, "intervals": 12, "lead": lead},
         "network": {"engine": "packet", "topology": str(topology), "loss": 0.02},
         "sources": [{"name": f"pmu{i:02d}", "bus": bus} for i, bus in enumerate((2, 4, 61))],
