@@ -70,7 +70,7 @@ def inlined(function: Function) -> Function:
     """Return `function` as `compiled` does, put into each of its callers in place of a call."""
     if not IS_ON:
         return function
-    options = {"cache": True, "nogil": True, "error_model": "numpy", "forceinline": True}
+    options = {"nogil": True, "error_model": "numpy", "inline": "always"}
     return numba.njit(**options)(function)
 
 

@@ -70,22 +70,24 @@ def controller_ages(series: pd.DataFrame) -> Figure:
 
 
 def busiest_links(series: pd.DataFrame, count: int = LINKS) -> Figure:
-    """Return a figure with load, queue and drops of the links with the highest mean utilisation.
+    """Return a figure with load, queue and drops of the links that dropped most, or carried most.
 
     Args:
         series: a `link_series.parquet` with at least one row.
         count: directions of links to draw.
     """
     windows = sorted(set(series["t_s"]))
-    sums = series.groupby(["from", "to"])[["utilisation", "dropped_queue"]].sum()
-    shown = list(sums.sort_values([*sums.columns], ascending=False).index[:count])
+    drops = [f"dropped_{how}" for how in ("queue", "loss", "down")]
+    sums = series.groupby(["from", "to"])[["utilisation", *drops]].sum()
+    ranks = sums.assign(dropped=sums[drops].sum(axis=1))[["dropped", "utilisation"]]
+    shown = list(ranks.sort_values([*ranks.columns], ascending=False).index[:count])
     figure = Figure(figsize=(PANEL_INCHES[0], 6.6), layout="constrained")
     panels = figure.subplots(3, 1, sharex=True)
     for pair, colour in zip(shown, colours(len(shown)), strict=True):
         own = series[(series["from"] == pair[0]) & (series["to"] == pair[1])]
         # A window without a row is one in which the link carried nothing.
         numbers = own.drop(columns=["from", "to"]).set_index("t_s").reindex(windows, fill_value=0)
-        dropped = np.cumsum(sum(numbers[f"dropped_{how}"] for how in ("queue", "loss", "down")))
+        dropped = np.cumsum(numbers[drops].sum(axis=1))
         label = f"{pair[0]} to {pair[1]}"
         panels[0].plot(windows, 100 * numbers["utilisation"], color=colour, label=label)
         panels[1].step(windows, numbers["max_queue"], color=colour, where="pre")

@@ -3,7 +3,7 @@
 An event's item says what happens: 8 times a number plus one of the kinds below.
 """
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled, inlined
 from tieline.network.draws import CHUNK
 from tieline.network.packet.heap import pop, push
 from tieline.network.packet.memory import (
@@ -28,13 +28,13 @@ KINDS = 1 << KIND_BITS
 _STREAM = COLUMNS["streams"]
 
 
-@compiled
+@inlined
 def item_of(kind: int, number: int) -> int:
     """Return the item of an event."""
     return (number << KIND_BITS) + kind
 
 
-@compiled
+@inlined
 def next_order(cells: Cells, at: Layout) -> int:
     """Return the order number of a new event."""
     order = cells[at.control + NEXT_ORDER]
@@ -42,21 +42,21 @@ def next_order(cells: Cells, at: Layout) -> int:
     return order
 
 
-@compiled
+@inlined
 def push_event(time_ns: int, order: int, item: int, cells: Cells, at: Layout) -> None:
     """Add an event."""
     push(cells, at.heap, cells[at.control + HEAP_SIZE], time_ns, order, item)
     cells[at.control + HEAP_SIZE] += 1
 
 
-@compiled
+@inlined
 def pop_event(cells: Cells, at: Layout) -> None:
     """Remove the first event."""
     pop(cells, at.heap, cells[at.control + HEAP_SIZE])
     cells[at.control + HEAP_SIZE] -= 1
 
 
-@compiled
+@inlined
 def take(stream: int, cells: Cells, at: Layout) -> int:
     """Return the next number of a stream; asks for more once a whole chunk is used up."""
     row = at.streams + _STREAM * stream

@@ -9,7 +9,7 @@ from tieline.compiled import compiled, inlined
 from tieline.network.packet.memory import HEAP_COLUMNS, ITEM, ORDER, TIME, Cells
 
 
-@inlined
+@compiled
 def push(cells: Cells, heap: int, size: int, time_ns: int, order: int, item: int) -> None:
     """Add an event to a heap of `size` events; the table must have a row more than that."""
     place = size
@@ -22,7 +22,7 @@ def push(cells: Cells, heap: int, size: int, time_ns: int, order: int, item: int
     _write(cells, heap + HEAP_COLUMNS * place, time_ns, order, item)
 
 
-@inlined
+@compiled
 def replace_first(cells: Cells, heap: int, size: int, time_ns: int, order: int, item: int) -> None:
     """Put an event in the place of the first and restore the order: a pop and a push in one."""
     place = 0
@@ -52,20 +52,20 @@ def pop(cells: Cells, heap: int, size: int) -> None:
         )
 
 
-@compiled
+@inlined
 def _precedes(cells: Cells, time_ns: int, order: int, row: int) -> bool:
     other_ns = cells[row + TIME]
     return time_ns < other_ns or (time_ns == other_ns and order < cells[row + ORDER])
 
 
-@compiled
+@inlined
 def _move(cells: Cells, origin: int, row: int) -> None:
     cells[row + TIME] = cells[origin + TIME]
     cells[row + ORDER] = cells[origin + ORDER]
     cells[row + ITEM] = cells[origin + ITEM]
 
 
-@compiled
+@inlined
 def _write(cells: Cells, row: int, time_ns: int, order: int, item: int) -> None:
     cells[row + TIME] = time_ns
     cells[row + ORDER] = order

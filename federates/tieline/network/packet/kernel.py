@@ -122,7 +122,7 @@ def announce(times_ns: Cells, items: Cells, base_order: int, cells: Cells, at: L
         push_event(times_ns[place], order, items[place], cells, at)
 
 
-@compiled
+@inlined
 def events_with_room(cells: Cells, at: Layout) -> int:
     """Return how many events can be processed for certain, whatever they are."""
     free = min(
@@ -164,7 +164,7 @@ def _arrive(now: int, slot: int, cells: Cells, at: Layout) -> None:
             _reach_target(now, flow, sequence, cells, at)
 
 
-@compiled
+@inlined
 def _lose(now: int, slot: int, cells: Cells, at: Layout) -> None:
     """A packet that its link has lost would reach the end."""
     packet = at.packets + _PACKET * slot
@@ -175,7 +175,7 @@ def _lose(now: int, slot: int, cells: Cells, at: Layout) -> None:
     dropped(now, cells[packet + FLOW], cells[packet + SEQUENCE], hop, LOSS, cells, at)
 
 
-@compiled
+@inlined
 def _leave(slot: int, cells: Cells, at: Layout) -> None:
     """Take a packet, whose event is the first of the heap, out of the network."""
     pop_event(cells, at)
@@ -196,14 +196,14 @@ def _reach_target(now: int, flow: int, sequence: int, cells: Cells, at: Layout) 
         push_event(now + cells[row + THINK], next_order(cells, at), item, cells, at)
 
 
-@compiled
+@inlined
 def _reply(now: int, flow: int, cells: Cells, at: Layout) -> None:
     """The target of a request answers it."""
     row = at.cross + _CROSS * (flow - at.pmu_flows)
     enter(now, flow, cells[row + SENT], cells, at)
 
 
-@compiled
+@inlined
 def _send_cross(now: int, number: int, cells: Cells, at: Layout) -> None:
     """A cross flow sends a packet and plans its next one."""
     row = at.cross + _CROSS * number

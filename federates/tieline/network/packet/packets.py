@@ -1,6 +1,6 @@
 """How packets enter the network, are copied in it, and end."""
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled, inlined
 from tieline.network.engine import DELIVERED, LINK_DOWN, QUEUE_FULL
 from tieline.network.packet.events import ARRIVAL, item_of, next_order, push_event, take
 from tieline.network.packet.memory import (
@@ -49,7 +49,7 @@ _FLOW, _CROSS, _DESTINATION, _PACKET, _ENDED = (
 )
 
 
-@compiled
+@inlined
 def enter(now: int, flow: int, sequence: int, cells: Cells, at: Layout) -> None:
     """A flow's datagram of its usual size enters the network."""
     enter_datagram(now, flow, sequence, cells[at.flows + _FLOW * flow + DATAGRAM], cells, at)
@@ -117,13 +117,13 @@ def record_end(now: int, flow: int, sequence: int, how: int, cells: Cells, at: L
     cells[at.control + ENDED] += 1
 
 
-@compiled
+@inlined
 def drop_reason(refusal: int) -> int:
     """Return how a packet ends that a port has refused."""
     return LINK_DOWN if refusal == DROPPED_AT_CUT else QUEUE_FULL
 
 
-@compiled
+@inlined
 def _start(
     now: int, flow: int, sequence: int, part: int, hop: int, size: int, cells: Cells, at: Layout
 ) -> None:

@@ -89,7 +89,7 @@ _CLASS, _PACKET, _TAP, _RING = (COLUMNS[name] for name in ("classes", "packets",
 _NS_PER_S = 1_000_000_000
 
 
-@inlined
+@compiled
 def transmit(now: int, slot: int, hop: int, cells: Cells, at: Layout) -> int:
     """Return when the packet in `slot` reaches the end of the link, or one of the above.
 
@@ -141,7 +141,7 @@ def link_bytes(slot: int, cells: Cells, at: Layout) -> int:
     return cells[packet + IP_BYTES] + cells[port + OVERHEAD]
 
 
-@compiled
+@inlined
 def _service_ns(size: int, port: int, cells: Cells) -> int:
     """Return the serialisation time of some bytes, rounded to the nearest nanosecond."""
     rate = cells[port + RATE]
@@ -183,7 +183,7 @@ def _queue(now: int, start_ns: int, size: int, port: int, cells: Cells, at: Layo
     return is_accepted
 
 
-@compiled
+@inlined
 def _waiting(now: int, port: int, cells: Cells, at: Layout) -> int:
     """Return how many packets wait at a port without a server."""
     ring = at.ring + _RING * cells[port + RING]
@@ -199,7 +199,7 @@ def _waiting(now: int, port: int, cells: Cells, at: Layout) -> int:
     return waiting
 
 
-@compiled
+@inlined
 def _wait(start_ns: int, size: int, port: int, cells: Cells, at: Layout) -> None:
     """Note a packet that waits there until `start_ns`; there must be room for it."""
     room = cells[port + QUEUE]
@@ -275,7 +275,7 @@ def _reach(
     return arrival_ns
 
 
-@compiled
+@inlined
 def _is_lost(size: int, port: int, cells: Cells, at: Layout) -> int:
     """Return 1 if the link loses a packet, by its own losses or by those of an event."""
     lost = 0
@@ -287,7 +287,7 @@ def _is_lost(size: int, port: int, cells: Cells, at: Layout) -> int:
     return lost
 
 
-@compiled
+@inlined
 def _passes(amount: int, left: int, stream: int, cells: Cells, at: Layout) -> int:
     """Return 1 if the next loss, `left` units ahead, falls within some; then look for another."""
     cells[left] -= amount
@@ -297,7 +297,7 @@ def _passes(amount: int, left: int, stream: int, cells: Cells, at: Layout) -> in
     return lost
 
 
-@compiled
+@inlined
 def _transmit_served(now: int, slot: int, hop: int, cells: Cells, at: Layout) -> int:
     """A packet comes to a port with a server."""
     plan = at.hops + HOP_COLUMNS * hop
@@ -346,7 +346,7 @@ def _serve(now: int, slot: int, port: int, cells: Cells, at: Layout) -> int:
     return _reach(now, service_ns, size, slot, port, cells, at)
 
 
-@compiled
+@inlined
 def _next_waiting(port: int, cells: Cells, at: Layout) -> int:
     """Take the packet out of a port's classes that is next; one must wait."""
     first, end = cells[port + FIRST_CLASS], cells[port + END_CLASSES]
@@ -369,7 +369,7 @@ def _next_waiting(port: int, cells: Cells, at: Layout) -> int:
     return slot
 
 
-@compiled
+@inlined
 def _turn(port: int, cells: Cells, at: Layout) -> int:
     """Return the class whose turn it is by deficit round robin.
 

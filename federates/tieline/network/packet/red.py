@@ -5,7 +5,7 @@ Networking 1 (1993), sections IV and VII: the averaged queue, measured in packet
 the last early drop, and the decay of the average while the port was idle.
 """
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled, inlined
 from tieline.network.packet.events import take
 from tieline.network.packet.memory import (
     COLUMNS,
@@ -28,7 +28,7 @@ _BITS = 30
 _RED = COLUMNS["red"]
 
 
-@compiled
+@inlined
 def is_dropped_early(
     now: int, waiting: int, service_ns: int, port: int, cells: Cells, at: Layout
 ) -> bool:
@@ -61,7 +61,7 @@ def is_dropped_early(
     return False
 
 
-@compiled
+@inlined
 def _decayed(packets: int, row: int, cells: Cells) -> int:
     """Return (1 - weight)^packets, 2^30 being 1."""
     result = CERTAIN

@@ -10,7 +10,7 @@ acknowledgement, Nagle's rule (a frame is sent at once), a receiver that is slow
 Windows are kept in 1/1024 segments, times in nanoseconds.
 """
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled, inlined
 from tieline.network.engine import DELIVERED, QUEUE_FULL
 from tieline.network.packet.events import TIMER, item_of, next_order, push_event
 from tieline.network.packet.memory import (
@@ -51,7 +51,7 @@ _DUPLICATES = 3
 _RECEIVED = COLUMNS["received"]
 
 
-@compiled
+@inlined
 def begin_or_end(now: int, connection: int, cells: Cells, at: Layout) -> None:
     """A connection with endless data begins to send; the second time, it sends nothing new."""
     row = at.connections + CONNECTION_COLUMNS * connection
@@ -110,13 +110,13 @@ def on_timer(now: int, connection: int, cells: Cells, at: Layout) -> None:
         _send_what_fits(now, connection, cells, at)
 
 
-@compiled
+@inlined
 def _place(segment: int, row: int, cells: Cells, at: Layout) -> int:
     """Return the row of `received` for a segment."""
     return at.received + _RECEIVED * (cells[row + RECEIVED] + segment % cells[row + MOST])
 
 
-@compiled
+@inlined
 def _on_segment(now: int, segment: int, row: int, cells: Cells, at: Layout) -> None:
     expected = cells[row + EXPECTED]
     if segment >= expected:
@@ -131,7 +131,7 @@ def _on_segment(now: int, segment: int, row: int, cells: Cells, at: Layout) -> N
     enter(now, cells[row + ACK_FLOW], expected, cells, at)
 
 
-@compiled
+@inlined
 def _on_acknowledgement(now: int, number: int, connection: int, cells: Cells, at: Layout) -> None:
     row = at.connections + CONNECTION_COLUMNS * connection
     if number > cells[row + UNACKNOWLEDGED]:
@@ -149,7 +149,7 @@ def _on_acknowledgement(now: int, number: int, connection: int, cells: Cells, at
     _send_what_fits(now, connection, cells, at)
 
 
-@compiled
+@inlined
 def _on_news(now: int, number: int, connection: int, cells: Cells, at: Layout) -> None:
     """Segments have been acknowledged for the first time."""
     row = at.connections + CONNECTION_COLUMNS * connection
@@ -182,7 +182,7 @@ def _on_news(now: int, number: int, connection: int, cells: Cells, at: Layout) -
         _send_again(now, connection, cells, at)
 
 
-@compiled
+@inlined
 def _learn_wait(round_trip_ns: int, row: int, cells: Cells) -> None:
     """Set the retransmission time by RFC 6298, section 2."""
     if cells[row + SMOOTHED] == 0:
@@ -196,7 +196,7 @@ def _learn_wait(round_trip_ns: int, row: int, cells: Cells) -> None:
     cells[row + WAIT] = min(max(wait, cells[row + LEAST_WAIT]), MOST_WAIT_NS)
 
 
-@compiled
+@inlined
 def _send_again(now: int, connection: int, cells: Cells, at: Layout) -> None:
     """Send the first unacknowledged segment once more."""
     row = at.connections + CONNECTION_COLUMNS * connection
