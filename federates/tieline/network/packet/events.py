@@ -3,7 +3,7 @@
 An event's item says what happens: 8 times a number plus one of the kinds below.
 """
 
-from tieline.compiled import compiled, inlined
+from tieline.compiled import inlined
 from tieline.network.draws import CHUNK
 from tieline.network.packet.heap import pop, push
 from tieline.network.packet.memory import (

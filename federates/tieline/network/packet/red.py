@@ -5,7 +5,7 @@ Networking 1 (1993), sections IV and VII: the averaged queue, measured in packet
 the last early drop, and the decay of the average while the port was idle.
 """
 
-from tieline.compiled import compiled, inlined
+from tieline.compiled import inlined
 from tieline.network.packet.events import take
 from tieline.network.packet.memory import (
     COLUMNS,
