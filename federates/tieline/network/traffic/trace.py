@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationInfo
 
+from tieline.errors import InputError
 from tieline.network.draws import NEVER, Chunks, chunked
 from tieline.network.entry import named_file
 from tieline.network.traffic.base import HEADER_BYTES, MOST_PAYLOAD, FlowEntry, Traffic
 from tieline.units import NS_PER_S, seconds_to_ns
 
 COLUMNS = ("time_s", "payload_bytes")
+CAPTURES = (".pcap", ".cap")
+"""Endings of capture files; any other file is taken for a CSV."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +107,26 @@ def _whole(where: str, row: dict[str, str], name: str, low: int, high: int) -> i
     return int(value)
 
 
+def replayed(path: Path) -> Trace:
+    """Return the packets of a capture file, each as a datagram of its size.
+
+    Raises:
+        ValueError: the file is no capture that can be read.
+    """
+    # Captures know the network, and the network its kinds of traffic.
+    from tieline.network.pcap import read_pcap
+
+    try:
+        recorded = read_pcap(path)
+    except InputError as error:
+        raise ValueError(str(error)) from error
+    payloads = np.clip(recorded.sizes_bytes - HEADER_BYTES, 1, MOST_PAYLOAD)
+    return Trace(recorded.times_ns, payloads)
+
+
 def _trace_of(value: Any, info: ValidationInfo) -> Trace:
-    return read_trace(named_file(value, info))
+    path = named_file(value, info)
+    return replayed(path) if path.suffix in CAPTURES else read_trace(path)
 
 
 class TraceEntry(FlowEntry):
@@ -113,7 +134,7 @@ class TraceEntry(FlowEntry):
 
     kind: Literal["trace"]
     file: Annotated[Trace, BeforeValidator(_trace_of)] = Field(
-        description="CSV file, relative to the topology file"
+        description="CSV or pcap file, relative to the topology file"
     )
 
     def traffic(self) -> Traffic:
