@@ -182,8 +182,9 @@ def _forget_events(memory: Memory, slots: Cells, port: int) -> None:
 
 
 def _drop(now: int, slot: int, memory: Memory) -> None:
-    packet = memory.table("packets")[slot].tolist()
-    dropped(now, packet[0], packet[1], packet[HOP], LINK_DOWN, memory.cells, memory.layout)
+    packet = memory.table("packets")[slot]
+    flow, sequence, hop = (int(packet[column]) for column in (FLOW, SEQUENCE, HOP))
+    dropped(now, flow, sequence, hop, LINK_DOWN, memory.cells, memory.layout)
 
 
 def _set_rate(change: RateChange, port: int, memory: Memory) -> Cells:

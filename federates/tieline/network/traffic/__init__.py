@@ -1,9 +1,5 @@
 """Kinds of background traffic, one a file; `TRAFFIC` are the names that a topology file may use."""
 
-from typing import Annotated
-
-from pydantic import Field
-
 from tieline.network.entry import Entry
 from tieline.network.traffic.base import HEADER_BYTES, IP_HEADER, UDP_HEADER, FlowEntry, Traffic
 from tieline.network.traffic.cbr import Cbr, CbrEntry
@@ -29,7 +25,6 @@ __all__ = [
     "Polling",
     "Trace",
     "Traffic",
-    "TrafficEntry",
 ]
 
 TRAFFIC: dict[str, type[Entry]] = {
@@ -42,14 +37,3 @@ TRAFFIC: dict[str, type[Entry]] = {
     "greedy": GreedyEntry,
     "flood": FloodEntry,
 }
-TrafficEntry = Annotated[
-    CbrEntry
-    | PoissonEntry
-    | OnOffEntry
-    | FilesEntry
-    | TraceEntry
-    | PollingEntry
-    | GreedyEntry
-    | FloodEntry,
-    Field(discriminator="kind"),
-]

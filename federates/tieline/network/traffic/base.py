@@ -1,13 +1,14 @@
 """What every kind of background traffic does: it says when its packets leave, and how large."""
 
-from typing import Annotated, Protocol, runtime_checkable
+from dataclasses import dataclass, replace
+from typing import Annotated, Protocol, Self, runtime_checkable
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from tieline.network.draws import Chunks
 from tieline.network.entry import Entry
-from tieline.units import BitsPerSecond, Seconds
+from tieline.units import NS_PER_S, BitsPerSecond, Seconds
 
 UDP_HEADER, IP_HEADER = 8, 20
 HEADER_BYTES = UDP_HEADER + IP_HEADER
@@ -66,6 +67,23 @@ class Acknowledged(Traffic, Protocol):
     @property
     def window_segments(self) -> int:
         """Return the most segments that are under way."""
+
+
+@dataclass(frozen=True)
+class AtRate:
+    """Datagrams of one size at a mean rate."""
+
+    rate_bps: float
+    payload_bytes: int
+
+    @property
+    def gap_ns(self) -> float:
+        """Mean time between two datagrams."""
+        return (self.payload_bytes + HEADER_BYTES) * 8 * NS_PER_S / self.rate_bps
+
+    def scaled(self, factor: float) -> Self:
+        """Return it at another rate."""
+        return replace(self, rate_bps=self.rate_bps * factor)
 
 
 Payload = Annotated[int, Field(ge=1, le=MOST_PAYLOAD, strict=True, description="payload, bytes")]

@@ -1,26 +1,17 @@
 """Constant bit rate: equal gaps, from a random phase."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from tieline.network.draws import CHUNK, Chunks
-from tieline.network.traffic.base import HEADER_BYTES, FlowEntry, Payload, Rate, Traffic
-from tieline.units import NS_PER_S
+from tieline.network.traffic.base import AtRate, FlowEntry, Payload, Rate, Traffic
 
 
 @dataclass(frozen=True)
-class Cbr:
+class Cbr(AtRate):
     """Datagrams of one size at equal gaps."""
-
-    rate_bps: float
-    payload_bytes: int
-
-    @property
-    def gap_ns(self) -> float:
-        """Time between two datagrams."""
-        return (self.payload_bytes + HEADER_BYTES) * 8 * NS_PER_S / self.rate_bps
 
     def gaps(self, generator: np.random.Generator) -> Chunks:
         """Yield the gaps; the instants, not the gaps, are rounded, so that the rate is exact."""
@@ -32,10 +23,6 @@ class Cbr:
             yield np.diff(instants, prepend=last_ns)
             last_ns = int(instants[-1])
             count += CHUNK
-
-    def scaled(self, factor: float) -> Traffic:
-        """Return it at another rate."""
-        return replace(self, rate_bps=self.rate_bps * factor)
 
 
 class CbrEntry(FlowEntry):

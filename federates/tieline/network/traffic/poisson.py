@@ -1,36 +1,23 @@
 """Poisson traffic: exponential gaps, as of many independent users."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from tieline.network.draws import CHUNK, Chunks
-from tieline.network.traffic.base import HEADER_BYTES, FlowEntry, Payload, Rate, Traffic
-from tieline.units import NS_PER_S
+from tieline.network.traffic.base import AtRate, FlowEntry, Payload, Rate, Traffic
 
 
 @dataclass(frozen=True)
-class Poisson:
+class Poisson(AtRate):
     """Datagrams of one size at exponential gaps."""
-
-    rate_bps: float
-    payload_bytes: int
-
-    @property
-    def gap_ns(self) -> float:
-        """Mean time between two datagrams."""
-        return (self.payload_bytes + HEADER_BYTES) * 8 * NS_PER_S / self.rate_bps
 
     def gaps(self, generator: np.random.Generator) -> Chunks:
         """Yield the gaps."""
         while True:
             exponential = generator.standard_exponential(CHUNK) * self.gap_ns
             yield np.rint(exponential).astype(np.int64)
-
-    def scaled(self, factor: float) -> Traffic:
-        """Return it at another rate."""
-        return replace(self, rate_bps=self.rate_bps * factor)
 
 
 class PoissonEntry(FlowEntry):
