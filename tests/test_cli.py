@@ -9,6 +9,7 @@ from typer.testing import CliRunner, Result
 import tieline
 from synthetic_result import CONSTANT, EXPERIMENT, SWEEP, fake_launch, known_sites
 from tieline import cli
+from tieline.cli import run as run_command
 from tieline.errors import CosimError
 from tieline.experiment import plan
 from tieline.experiment import report as experiment_report
@@ -21,7 +22,7 @@ SETTINGS = [part for setting in CONSTANT for part in ("--set", setting)]
 def _no_federation(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Stand in for case, network and launcher; each test works in a folder of its own."""
     monkeypatch.setattr(plan.prepare, "__defaults__", (known_sites,))
-    monkeypatch.setattr(cli, "launcher", lambda: fake_launch)
+    monkeypatch.setattr(run_command, "launcher", lambda: fake_launch)
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.chdir(tmp_path)
     Path("tiny.yaml").write_text(EXPERIMENT)
@@ -159,7 +160,7 @@ def test_a_failed_run_exits_with_the_code_of_its_error(
     def launch(folder: Path, on_progress: Any) -> Any:
         raise error
 
-    monkeypatch.setattr(cli, "launcher", lambda: launch)
+    monkeypatch.setattr(run_command, "launcher", lambda: launch)
     result = call("run", "tiny.yaml", *SETTINGS, "--out", "out")
     assert result.exit_code == code
     assert words in result.stderr

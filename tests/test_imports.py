@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import tieline
+from tieline.compiled import UNCOMPILED
 
 ROOT = Path(tieline.__file__).parent
 MODULES = sorted(ROOT.rglob("*.py"))
@@ -71,3 +72,13 @@ def test_floats_and_nanoseconds_meet_in_units_alone() -> None:
     conversion = re.compile(r"[*/]\s*1e-?9\b")
     for path in [*part("grid"), *part("network"), *part("wams"), *part("cosim")]:
         assert not conversion.search(path.read_text(encoding="utf-8")), path
+
+
+def test_what_the_cache_of_compiled_code_leaves_out_takes_no_part_in_it() -> None:
+    """A kernel with an old constant from a file outside the cache's key would stay in use."""
+    outside = [f"tieline.{name}" for name in UNCOMPILED]
+    for path in MODULES:
+        if path.relative_to(ROOT).parts[0] in UNCOMPILED:
+            assert not begins(imports(path), "tieline.compiled", "numba"), path
+    for path in [*part("grid"), *part("network"), *part("wams"), *part("c37118")]:
+        assert not begins(imports(path), *outside), path

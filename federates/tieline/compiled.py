@@ -6,6 +6,7 @@ not depend on how a compiler reorders sums.
 Compiled code is cached. numba renews a cached function when its own file changes, but not when a
 constant or a function that it took from another file does; so each state of the package's source
 has a cache folder of its own, in `$XDG_CACHE_HOME/tieline` unless NUMBA_CACHE_DIR names another.
+What `UNCOMPILED` names takes no part in it: a new word in a report compiles nothing anew.
 """
 
 import hashlib
@@ -26,6 +27,9 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 # numba calls first-class functions experimental at each compilation that sees one.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
+UNCOMPILED = ("cli", "experiment", "report")
+"""Parts of the package that hold no compiled code, and that none of it takes anything from."""
+
 CACHES_KEPT = 4
 """Cache folders that stay, the newest first: those of other versions and checkouts."""
 
@@ -37,7 +41,9 @@ def _use_own_cache() -> None:
     package = Path(__file__).resolve().parent
     digest = hashlib.sha256()
     for path in sorted(package.rglob("*.py")):
-        digest.update(path.relative_to(package).as_posix().encode() + path.read_bytes())
+        inside = path.relative_to(package)
+        if inside.parts[0] not in UNCOMPILED:
+            digest.update(inside.as_posix().encode() + path.read_bytes())
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tieline"
     folder = home / digest.hexdigest()[:16]
     try:

@@ -1,0 +1,52 @@
+"""The application: every command by its name."""
+
+from typing import Annotated
+
+import typer
+
+import tieline
+from tieline.cli import linear, models, report, run
+from tieline.cli.topology import topology
+from tieline.console import say
+from tieline.errors import InputError
+
+HELP = """A power grid and the packet network that carries its measurements, simulated together.
+
+`tieline list` shows the experiments that come with it; `tieline run NAME` runs one.
+"""
+
+app = typer.Typer(help=HELP, add_completion=False, rich_markup_mode=None)
+
+
+def main() -> None:
+    """Run the command line."""
+    app(prog_name="tieline")
+
+
+@app.callback(invoke_without_command=True)
+def _common(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, help="print the version and end")
+    ] = False,
+) -> None:
+    if version:
+        say(f"tieline {tieline.__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        say(context.get_help())
+        raise typer.Exit(InputError.exit_code)
+
+
+for command in (
+    run.run,
+    run.list_,
+    run.validate,
+    report.report,
+    models.models,
+    linear.modes,
+    linear.freqresp,
+    linear.damping,
+):
+    app.command(command.__name__.rstrip("_"))(command)
+app.add_typer(topology)
