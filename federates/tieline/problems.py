@@ -1,11 +1,14 @@
 """Turns what pydantic found into sentences: where, what was given, what is allowed."""
 
 import difflib
+import pathlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
+
+from tieline.units import QuantityError, dimension_of, unit_of
 
 Path = tuple[str | int, ...]
 Model = TypeVar("Model", bound=BaseModel)
@@ -35,10 +38,18 @@ def near(given: object, allowed: Iterable[str]) -> str:
     return f"; did you mean '{by_lower[found[0]]}'?" if found else ""
 
 
-def checked(model: type[Model], data: object) -> tuple[Model | None, list[Problem]]:
-    """Return the model that the data describe, or None, and every problem found."""
+def checked(
+    model: type[Model], data: object, folder: pathlib.Path | None = None
+) -> tuple[Model | None, list[Problem]]:
+    """Return the model that the data describe, or None, and every problem found.
+
+    Args:
+        model: what they should be.
+        data: lists, groups and single values, as a file has them.
+        folder: where files that the data name are looked for; else the working folder.
+    """
     try:
-        return model.model_validate(data), []
+        return model.model_validate(data, context={"folder": folder or pathlib.Path()}), []
     except ValidationError as error:
         found: dict[Path, list[_Error]] = {}
         for item in error.errors(include_url=False):
@@ -88,9 +99,9 @@ def _sentence(model: type[BaseModel], data: Any, path: Path, errors: Sequence[_E
     given = value_at(data, path)
     if kind == "union_tag_not_found":
         return _unclear_event(model, path, given)
-    if kind == "value_error":
+    if kind == "value_error" and len(errors) == 1:
         return f"{where} {first['ctx']['error']}"
-    unit = " s" if (_description(model, path) or "").endswith(", s") else ""
+    unit = _unit(model, path)
     allowed = " or ".join(dict.fromkeys(_allowed(error, unit) for error in errors))
     words = [word for error in errors for word in _words(error)]
     hint = near(given, words) if isinstance(given, str) else ""
@@ -107,10 +118,15 @@ def _unknown_key(model: type[BaseModel], path: Path) -> str:
 
 
 def _unclear_event(model: type[BaseModel], path: Path, given: object) -> str:
-    kinds = [name for name in _fields(model, path) if name != "at"]
+    common = [name for name in ("at",) if name in _fields(model, path)]
+    kinds = [name for name in _fields(model, path) if name not in ("at", "when")]
     if not isinstance(given, dict):
-        return f"{dotted(path)} must be a group of keys: at, and {' or '.join(kinds)}"
-    hints = [near(key, kinds) for key in given if key != "at"]
+        keys = "".join(f"{name}, and " for name in common)
+        return (
+            f"{dotted(path)} must be a group of keys: {keys}{' or '.join(kinds)}"
+            f" (got {_shown(given)})"
+        )
+    hints = [near(key, kinds) for key in given if key not in common]
     hint = next((hint for hint in hints if hint), "")
     keys = ", ".join(map(str, given))
     return f"{dotted(path)} must have just one of {' and '.join(kinds)} (got {keys}{hint})"
@@ -144,8 +160,12 @@ def _allowed(error: _Error, unit: str) -> str:
     if kind == "literal_error":
         words = _words(error)
         return f"one of {', '.join(words)}" if len(words) > 1 else f"'{words[0]}'"
+    if kind == "value_error":
+        reason = context["error"]
+        return reason.allowed if isinstance(reason, QuantityError) else str(reason)
     if kind in ("too_short", "string_too_short"):
-        return "not empty"
+        least = context["min_length"]
+        return "not empty" if least == 1 else f"at least {least} long"
     if kind == "too_long" or kind == "string_too_long":
         return f"at most {context['max_length']} long"
     if kind == "string_pattern_mismatch":
@@ -192,6 +212,14 @@ def _fields(model: type[BaseModel], path: Path) -> dict[str, Any]:
             fields = [kind.model_fields[part] for kind in models if part in kind.model_fields]
             models = [found for field in fields for found in _models_in(field.annotation)]
     return {name: field for kind in models for name, field in kind.model_fields.items()}
+
+
+def _unit(model: type[BaseModel], path: Path) -> str:
+    """Return ` s`, or whatever unit the setting at a path may be written with, or nothing."""
+    named = [part for part in path if isinstance(part, str)]
+    field = _fields(model, tuple(named[:-1])).get(named[-1]) if named else None
+    unit = None if field is None else unit_of(field)
+    return f" {unit}" if unit and dimension_of(unit) else ""
 
 
 def _description(model: type[BaseModel], path: Path) -> str | None:

@@ -141,12 +141,10 @@ class Quantity:
             return quantity(value, self.dimension)
         if not isinstance(value, str):
             return value
-        try:
-            number = quantity(value, self.dimension)
-        except QuantityError as error:
-            example = f"a whole number, or text such as '60 {self.unit}'"
-            raise QuantityError(example, value) from error
-        if not float(number).is_integer():
+        if _QUANTITY.fullmatch(value) is None:
+            raise QuantityError("a whole number", value)
+        number = quantity(value, self.dimension)
+        if not number.is_integer():
             raise QuantityError(f"a whole number of {self.unit}", value)
         return int(number)
 

@@ -115,7 +115,8 @@ MISTAKES = [
         ["network.delay has no effect", "constant"],
     ),
     ("engine: packet", "loss: 1", 16, ["network.loss must be less than 1"]),
-    ("engine: packet", "loss: 2 %", 16, ["network.loss must be a number", "'2 %'"]),
+    ("engine: packet", "loss: 2 km", 16, ["network.loss must be a share in one of %", "'2 km'"]),
+    ("engine: packet", "loss: some", 16, ["network.loss must be a number, or a share", "'some'"]),
     ("engine: packet", "record_packets: 1", 16, ["network.record_packets must be true or false"]),
     ("engine: packet", "delay: 5 km", 16, ["network.delay must be a time", "'5 km'"]),
     (

@@ -1,7 +1,6 @@
 """Single settings put over an experiment: `--set key=value`, and the keys of a sweep point."""
 
 import copy
-import os
 import pathlib
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,7 +8,8 @@ from typing import Any
 
 import yaml
 
-from tieline.problems import Path, value_at
+from tieline.experiment.layers import Layers, shortest
+from tieline.problems import Path
 from tieline.yaml_lines import Document
 
 
@@ -88,16 +88,26 @@ def _no_way(data: Any, part: str | int, before: str) -> str:
 
 @dataclass(frozen=True)
 class Sources:
-    """Where an experiment's settings come from: its file, and the options put over it."""
+    """Where an experiment's settings come from: its files, and the options put over them."""
 
-    document: Document
+    layers: Layers
     options: tuple[Override, ...] = ()
+
+    @property
+    def document(self) -> Document:
+        """Return the experiment's own file."""
+        return self.layers.document
+
+    @property
+    def folder(self) -> pathlib.Path:
+        """Return the folder from which names of files count."""
+        return self.document.path.parent.resolve()
 
     def where(self, paths: Iterable[Path], overrides: Iterable[Override] = ()) -> str:
         """Return the place to look at first for the settings at some paths.
 
-        An option or override that gives one of them goes before the file, and what the file gives
-        before what it leaves out.
+        An option or override that gives one of them goes before the files, what a file gives
+        before what all leave out, and the experiment's own file before those that it extends.
         """
         paths = list(paths)
         given = [*self.options, *overrides]
@@ -105,12 +115,5 @@ class Sources:
             for override in given:
                 if related(override.path, path):
                     return override.where
-        stated = [path for path in paths if value_at(self.document.data, path) is not None]
-        line = self.document.line([*stated, *paths][0])
-        return f"{shortest(self.document.path)}:{line}"
-
-
-def shortest(path: pathlib.Path) -> str:
-    """Return a path relative to the working folder where it lies within it."""
-    relative = os.path.relpath(path)
-    return str(path) if relative.startswith("..") else relative
+        document, line = self.layers.place(paths)
+        return f"{shortest(document.path)}:{line}"

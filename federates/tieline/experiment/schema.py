@@ -43,7 +43,7 @@ class Experiment(BaseModel):
         return round(self.grid.duration * self.rate_hz)
 
 
-FIXED: frozenset[str] = frozenset({"name", "question", "sweep"})
+FIXED: frozenset[str] = frozenset({"name", "question", "extends", "sweep"})
 """Keys that belong to the whole experiment: no sweep point can change them."""
 
 
@@ -59,6 +59,7 @@ def without_effect(experiment: Experiment) -> list[Problem]:
     readers = {
         "delay": ("constant", "helics-filters"),
         "mean_delay": PACKET_ENGINES,
+        "jitter": PACKET_ENGINES,
         "loss": (*PACKET_ENGINES, "empirical", "helics-filters"),
         "empirical": ("empirical",),
     }
