@@ -4,7 +4,7 @@ import difflib
 import pathlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -118,17 +118,18 @@ def _unknown_key(model: type[BaseModel], path: Path) -> str:
 
 
 def _unclear_event(model: type[BaseModel], path: Path, given: object) -> str:
-    common = [name for name in ("at",) if name in _fields(model, path)]
-    kinds = [name for name in _fields(model, path) if name not in ("at", "when")]
+    models = _models_at(model, path)
+    common = set.intersection(*(set(kind.model_fields) for kind in models))
+    kinds = [next(name for name in kind.model_fields if name not in common) for kind in models]
     if not isinstance(given, dict):
-        keys = "".join(f"{name}, and " for name in common)
+        keys = "at, and " if "at" in common else ""
         return (
             f"{dotted(path)} must be a group of keys: {keys}{' or '.join(kinds)}"
             f" (got {_shown(given)})"
         )
     hints = [near(key, kinds) for key in given if key not in common]
     hint = next((hint for hint in hints if hint), "")
-    keys = ", ".join(map(str, given))
+    keys = ", ".join(map(str, given)) or "none"
     return f"{dotted(path)} must have just one of {' and '.join(kinds)} (got {keys}{hint})"
 
 
@@ -204,13 +205,23 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
     return [model for part in get_args(annotation) for model in _models_in(part)]
 
 
-def _fields(model: type[BaseModel], path: Path) -> dict[str, Any]:
-    """Return the fields allowed at a path, of every model that may stand there."""
+def _models_at(model: type[BaseModel], path: Path) -> list[type[BaseModel]]:
+    """Return every model that may stand at a path; keys of a mapping are passed by."""
     models = [model]
+    is_mapping = False
     for part in path:
-        if isinstance(part, str):
+        if isinstance(part, str) and not is_mapping:
             fields = [kind.model_fields[part] for kind in models if part in kind.model_fields]
             models = [found for field in fields for found in _models_in(field.annotation)]
+            is_mapping = any(get_origin(field.annotation) is dict for field in fields)
+        else:
+            is_mapping = False
+    return models
+
+
+def _fields(model: type[BaseModel], path: Path) -> dict[str, Any]:
+    """Return the fields allowed at a path, of every model that may stand there."""
+    models = _models_at(model, path)
     return {name: field for kind in models for name, field in kind.model_fields.items()}
 
 

@@ -9,6 +9,7 @@ from tieline.cosim.interfaces import FederationSettings
 from tieline.grid.settings import GridSettings
 from tieline.network.settings import PACKET_ENGINES, NetworkSettings
 from tieline.problems import Path, Problem
+from tieline.units import Unit
 from tieline.wams.settings import WamsSettings
 
 CONTINUOUS_RATE_HZ = 60
@@ -25,11 +26,25 @@ class Experiment(BaseModel):
     )
     question: str = Field(min_length=1, description="the question it answers, in one sentence")
     case: str = Field("miniwecc", min_length=1, description="a shipped case, or a case folder")
-    seed: StrictInt = Field(1, ge=0, lt=2**63, description="seed of every named random stream")
-    grid: GridSettings = GridSettings()  # type: ignore[call-arg]
-    wams: WamsSettings = WamsSettings()  # type: ignore[call-arg]
-    network: NetworkSettings = NetworkSettings()  # type: ignore[call-arg]
-    federation: FederationSettings = FederationSettings()  # type: ignore[call-arg]
+    seed: Annotated[StrictInt, Unit("number")] = Field(
+        1, ge=0, lt=2**63, description="seed of every named random stream"
+    )
+    grid: GridSettings = Field(
+        GridSettings(),  # type: ignore[call-arg]
+        description="duration, integration, stabilisers, loads and disturbances",
+    )
+    wams: WamsSettings = Field(
+        WamsSettings(),  # type: ignore[call-arg]
+        description="the phasor measurements, and the average made of them",
+    )
+    network: NetworkSettings = Field(
+        NetworkSettings(),  # type: ignore[call-arg]
+        description="what carries the measurements, and what the experiment changes of it",
+    )
+    federation: FederationSettings = Field(
+        FederationSettings(),  # type: ignore[call-arg]
+        description="how the two federates meet",
+    )
 
     @property
     def rate_hz(self) -> int:

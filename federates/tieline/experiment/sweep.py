@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from tieline.experiment.layers import REPLACED
 from tieline.experiment.overrides import Override, Sources, apply, path_of, related
 from tieline.experiment.sampling import SweepFile, rows, slug_of
 from tieline.experiment.schema import FIXED, Experiment, contradictions, without_effect
@@ -190,7 +191,11 @@ def _misplaced(key: str, override: Override, sources: Sources) -> list[str]:
 
 def _groups(overrides: Iterable[Override]) -> list[str]:
     """Return which settings of a listed point are whole groups, which would hide what they drop."""
-    groups = [override for override in overrides if isinstance(override.value, dict)]
+    groups = [
+        override
+        for override in overrides
+        if isinstance(override.value, dict) and override.path not in REPLACED
+    ]
     return [
         f"{group.where}: write one setting a key, such as"
         f" {'.'.join(map(str, group.path))}.{next(iter(group.value), '...')}"

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, StrictFloat, S
 from tieline.units import Megawatts, Seconds, Unit
 
 Branch = Annotated[str, Field(min_length=1)]
-BusNumber = Annotated[StrictInt, Field(ge=1, le=10**9), Unit("number")]
+BusNumber = Annotated[StrictInt, Field(ge=1, le=999_999_999), Unit("number")]
 Step = Annotated[StrictFloat, Field(ge=-10, le=10), Unit("pu")]
 
 _BRANCH = "as FROM-TO bus numbers, with #N for the Nth circuit"

@@ -56,10 +56,10 @@ class PssSettings(BaseModel):
         description="share of the average against synchronous; none takes the case's own, or 1",
     )
     parameters: dict[str, OwnUnit] = Field(
-        default_factory=dict, description="parameters of every unit's model by symbol, as {T1: 0.2}"
+        {}, description="parameters of every unit's model by symbol, as {T1: 0.2}"
     )
     tuning: dict[str, dict[str, OwnUnit]] = Field(
-        default_factory=dict, description="parameters of single units, as {G3: {K: 5, T1: 0.2}}"
+        {}, description="parameters of single units, as {G3: {K: 5, T1: 0.2}}"
     )
     average: Literal["sensors", "rotors"] = Field(
         "sensors",

@@ -70,4 +70,4 @@ class GridSettings(_Strict):
         description="the stabilisers and their tuning",
     )
     loads: LoadSettings | None = Field(None, description="mix of every load; none keeps the case's")
-    events: list[Event] = Field(default_factory=list, description="disturbances, in any order")
+    events: list[Event] = Field([], description="disturbances, in any order")

@@ -48,7 +48,7 @@ class NodeEntry(Entry):
     """A substation and its buses."""
 
     buses: list[Annotated[int, Field(strict=True), Unit("number")]] = Field(
-        default_factory=list, description="numbers of the buses whose devices are wired to it"
+        [], description="numbers of the buses whose devices are wired to it"
     )
     x: Kilometres | None = Field(None, description="place in drawings, to the east")
     y: Kilometres | None = Field(None, description="place in drawings, to the north")
@@ -167,7 +167,7 @@ class RouteEntry(Entry):
 
     origin: str = Field(alias="from", description="node that sends")
     target: str = Field(alias="to", description="node that receives")
-    via: list[str] = Field(default_factory=list, description="nodes between them, in order")
+    via: list[str] = Field([], description="nodes between them, in order")
 
 
 class EventEntry(Entry):

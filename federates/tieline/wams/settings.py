@@ -6,7 +6,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt
 
 from tieline.units import PerSecond, Unit
 
-BusNumber = Annotated[StrictInt, Field(ge=1, le=10**9), Unit("number")]
+BusNumber = Annotated[StrictInt, Field(ge=1, le=999_999_999), Unit("number")]
 Weight = Annotated[StrictFloat, Field(ge=0, le=1e9), Unit("1")]
 
 

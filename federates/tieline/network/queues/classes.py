@@ -25,7 +25,7 @@ class ClassEntry(Entry):
     """A waiting line, and the DSCPs of the packets that wait in it."""
 
     dscp: list[Annotated[int, Unit("number")]] = Field(
-        default_factory=list,
+        [],
         description="marks, 0 to 63, of the packets of this class; the last class takes all others",
     )
     packets: Annotated[int, Unit("packets")] = Field(
