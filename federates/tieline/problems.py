@@ -55,37 +55,66 @@ def checked(
         for item in error.errors(include_url=False):
             found.setdefault(_data_path(item, data), []).append(item)
         return None, [
-            Problem((path,), _sentence(model, data, path, items))
+            _problem(model, data, path, items)
             for path, items in found.items()
             if not _is_explained_deeper(path, data, found)
+            and not (items[0]["type"] == "missing" and _is_misspelt(path, found))
         ]
+
+
+_OF_KEYS = ("missing", "extra_forbidden", "invalid_key")
 
 
 def _data_path(error: _Error, data: Any) -> Path:
     """Return where in the data an error stands: pydantic's location without the names of unions."""
-    path: list[str | int] = []
-    parts = list(error["loc"])
-    is_of_key = error["type"] in ("missing", "extra_forbidden", "invalid_key")
-    for i, part in enumerate(parts):
-        is_last = i == len(parts) - 1
-        if is_last and is_of_key:
-            path.append(part)
-        elif isinstance(data, dict) and part in data:
-            # A union's branch may have the name of a key: then the key itself comes next.
-            is_branch = not is_last and (is_of_key or parts[i + 1] in data)
-            if isinstance(data[part], dict | list) or not is_branch:
-                data = data[part]
-                path.append(part)
-        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
-            data = data[part]
-            path.append(part)
-    return tuple(path)
+    return _aligned(error["loc"], data, error["type"] in _OF_KEYS)[1]
+
+
+def _aligned(location: Path, data: Any, is_of_key: bool) -> tuple[int, Path]:
+    """Return how few parts of a location must be left out to follow it in the data, and the rest.
+
+    A union's branch may have the name of a key, so that each part may be either.
+    """
+    if not location:
+        return 0, ()
+    part, rest = location[0], location[1:]
+    if is_of_key and not rest:
+        return int(not isinstance(data, dict)), (part,)
+    left_out, path = _aligned(rest, data, is_of_key)
+    best = left_out + 1, path
+    inside = value_at(data, (part,))
+    if inside is not None or (isinstance(data, dict) and part in data):
+        left_out, path = _aligned(rest, inside, is_of_key)
+        best = min(best, (left_out, (part, *path)), key=lambda found: found[0])
+    return best
 
 
 def _is_explained_deeper(path: Path, data: Any, found: Iterable[Path]) -> bool:
     """Return whether a list failed only because of members that are reported themselves."""
     is_list = isinstance(value_at(data, path), list)
     return is_list and any(other[: len(path)] == path and other != path for other in found)
+
+
+def _is_misspelt(path: Path, found: Mapping[Path, Sequence[_Error]]) -> bool:
+    """Return whether a key is missing only because it is there with a letter wrong."""
+    beside = [
+        other
+        for other, errors in found.items()
+        if other[:-1] == path[:-1] and errors[0]["type"] == "extra_forbidden"
+    ]
+    return any(near(other[-1], [str(path[-1])]) for other in beside)
+
+
+def _problem(model: type[BaseModel], data: Any, path: Path, errors: Sequence[_Error]) -> Problem:
+    if errors[0]["type"] == "union_tag_not_found":
+        place, text = _unclear(model, path, value_at(data, path))
+        return Problem((place,), text)
+    return Problem((path,), _sentence(model, data, path, errors))
+
+
+def has_keys(model: type[BaseModel], path: Path) -> bool:
+    """Return whether a group of keys may stand at a path of a model's data."""
+    return bool(_models_at(model, path))
 
 
 def _sentence(model: type[BaseModel], data: Any, path: Path, errors: Sequence[_Error]) -> str:
@@ -97,8 +126,6 @@ def _sentence(model: type[BaseModel], data: Any, path: Path, errors: Sequence[_E
         about = _description(model, path)
         return f"missing key '{where}'" + (f": {about}" if about else "")
     given = value_at(data, path)
-    if kind == "union_tag_not_found":
-        return _unclear_event(model, path, given)
     if kind == "value_error" and len(errors) == 1:
         return f"{where} {first['ctx']['error']}"
     unit = _unit(model, path)
@@ -117,20 +144,23 @@ def _unknown_key(model: type[BaseModel], path: Path) -> str:
     return f"unknown key '{key}'{place} ({(hint or '; allowed: ' + ', '.join(beside))[2:]})"
 
 
-def _unclear_event(model: type[BaseModel], path: Path, given: object) -> str:
+def _unclear(model: type[BaseModel], path: Path, given: object) -> tuple[Path, str]:
+    """Return what is unclear about a group that must be one of several kinds, and where."""
     models = _models_at(model, path)
     common = set.intersection(*(set(kind.model_fields) for kind in models))
     kinds = [next(name for name in kind.model_fields if name not in common) for kind in models]
+    where = dotted(path)
     if not isinstance(given, dict):
         keys = "at, and " if "at" in common else ""
-        return (
-            f"{dotted(path)} must be a group of keys: {keys}{' or '.join(kinds)}"
-            f" (got {_shown(given)})"
-        )
-    hints = [near(key, kinds) for key in given if key not in common]
-    hint = next((hint for hint in hints if hint), "")
+        text = f"{where} must be a group of keys: {keys}{' or '.join(kinds)}"
+        return path, f"{text} (got {_shown(given)})"
+    strange = [key for key in given if key not in _fields(model, path)]
+    hints = [(key, hint) for key in strange if (hint := near(key, kinds))]
+    if hints and not any(kind in given for kind in kinds):
+        key, hint = hints[0]
+        return (*path, key), f"unknown key '{key}' in {where} ({hint[2:]})"
     keys = ", ".join(map(str, given)) or "none"
-    return f"{dotted(path)} must have just one of {' and '.join(kinds)} (got {keys}{hint})"
+    return path, f"{where} must have just one of {', '.join(kinds)} (got {keys})"
 
 
 _BOUNDS = {

@@ -74,7 +74,7 @@ MISTAKES = [
     ("  pss:\n    gain: 9\n    beta1: 1", "  pss: 9", 7, ["grid.pss must be a group of keys", "9"]),
     ("at: 1 s", "at: -1 s", 11, ["grid.events[0].at must be 0 s or more", "'-1 s'"]),
     ("at: 1 s, ", "", 11, ["missing key 'grid.events[0].at'"]),
-    ("trip_generator: G26", "trip_gen: G26", 11, ["trip_generator and trip_branch", "trip_gen"]),
+    ("trip_generator: G26", "trip_gen: G26", 11, ["unknown key 'trip_gen'", "'trip_generator'"]),
     ("trip_generator: G26", "trip_generator: 26", 11, ["trip_generator must be text", "26"]),
     ("trip_generator: G26", "trip_generator: G26, bus: 1", 11, ["unknown key 'bus'"]),
     ("{at: 1 s, trip_generator: G26}", "G26", 11, ["events[0] must be a group of keys"]),

@@ -2,7 +2,7 @@
 
 import copy
 import pathlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,11 +15,19 @@ from tieline.yaml_lines import Document
 
 @dataclass(frozen=True)
 class Override:
-    """One setting: `where` says in messages where it was given."""
+    """One setting: `where` says in messages where it was given.
+
+    Attributes:
+        path: the setting.
+        value: what it is.
+        where: the option, or file and line.
+        at: where the files hold its value, or nothing for an option.
+    """
 
     path: Path
     value: Any
     where: str
+    at: Path = ()
 
 
 def parse_settings(settings: Iterable[str]) -> tuple[list[Override], list[str]]:
@@ -114,6 +122,10 @@ class Sources:
         for path in paths:
             for override in given:
                 if related(override.path, path):
-                    return override.where
+                    inside = path[len(override.path) :]
+                    return self._line([(*override.at, *inside)]) if override.at else override.where
+        return self._line(paths)
+
+    def _line(self, paths: Sequence[Path]) -> str:
         document, line = self.layers.place(paths)
         return f"{shortest(document.path)}:{line}"

@@ -1,5 +1,6 @@
 """What an experiment file may say, and what must hold between its parts."""
 
+import pathlib
 from collections.abc import Iterator
 from typing import Annotated
 
@@ -7,10 +8,14 @@ from pydantic import BaseModel, ConfigDict, Field, StrictInt
 
 from tieline.cosim.interfaces import FederationSettings
 from tieline.grid.settings import GridSettings
+from tieline.network.findings import Findings
+from tieline.network.schema import EventEntry
 from tieline.network.settings import PACKET_ENGINES, NetworkSettings
+from tieline.network.traffic import TRAFFIC
 from tieline.problems import Path, Problem
 from tieline.units import Unit
 from tieline.wams.settings import WamsSettings
+from tieline.yaml_lines import Document
 
 CONTINUOUS_RATE_HZ = 60
 """Meetings of the federates a second when the average is formed at every integration step."""
@@ -64,7 +69,7 @@ FIXED: frozenset[str] = frozenset({"name", "question", "extends", "sweep"})
 
 def contradictions(experiment: Experiment) -> list[Problem]:
     """Return what does not fit together in an experiment whose single values are right."""
-    parts = (_timing, _average, _engine, _delay_line)
+    parts = (_timing, _average, _engine, _delay_line, _words)
     return [problem for part in parts for problem in part(experiment)]
 
 
@@ -87,6 +92,23 @@ def without_effect(experiment: Experiment) -> list[Problem]:
         for key, engines in readers.items()
         if getattr(network, key) is not None and network.engine not in engines
     ]
+
+
+def _words(experiment: Experiment) -> Iterator[Problem]:
+    """Yield what is wrong with traffic and events of the network in themselves.
+
+    Whether the nodes that they name exist is for the topology to say, and where a trace's file is.
+    """
+    given = {"traffic": experiment.network.traffic, "events": experiment.network.events}
+    for section, entries in given.items():
+        for i, entry in enumerate(entries):
+            findings = Findings(Document(pathlib.Path(), {section: list(entries)}, {}), "network.")
+            if section == "events":
+                findings.entry(entry, (section, i), EventEntry)
+            elif entry.get("kind") != "trace":
+                findings.tagged(entry, (section, i), "kind", TRAFFIC)
+            for line in findings.lines():
+                yield Problem((("network", section, i),), line)
 
 
 def _timing(experiment: Experiment) -> Iterator[Problem]:

@@ -8,7 +8,7 @@ from tieline.experiment.layers import REPLACED
 from tieline.experiment.overrides import Override, Sources, apply, path_of, related
 from tieline.experiment.sampling import SweepFile, rows, slug_of
 from tieline.experiment.schema import FIXED, Experiment, contradictions, without_effect
-from tieline.problems import Path, checked
+from tieline.problems import Path, checked, has_keys, near
 
 
 @dataclass(frozen=True)
@@ -97,12 +97,15 @@ def _listed(sweep: Sequence[Any], data: Any, sources: Sources) -> tuple[list[Poi
                 f"{where}: sweep[{i}] must be a group of keys: label, and settings (got {entry!r})"
             )
             continue
-        label, wrong = _label(i, entry, sources)
+        misspelt = next((key for key in entry if "label" not in entry and _is_label(key)), "label")
+        label, wrong = _label(i, entry, misspelt, sources)
         findings += wrong
-        settings = {key: value for key, value in entry.items() if key != "label"}
-        places = {key: sources.where([("sweep", i, key)]) for key in settings}
-        overrides, wrong = _overrides(label, settings, places, sources)
-        findings += wrong + _groups(overrides)
+        settings = {key: value for key, value in entry.items() if key not in ("label", misspelt)}
+        overrides, wrong = _overrides(i, settings, sources)
+        groups = _groups(overrides)
+        findings += wrong + groups
+        if groups:
+            continue
         point, problems = _point(label, slug_of(label), overrides, data, sources)
         findings += [text for _, text in problems]
         if point is None:
@@ -122,14 +125,15 @@ def _made(sweep: Mapping[Any, Any], data: Any, sources: Sources) -> tuple[list[P
         return [], [f"{sources.where(problem.paths)}: {problem.text}" for problem in problems]
     block = checked_file.sweep
     places = {key: sources.where([("sweep", "over", key)]) for key in block.over}
-    _, misplaced = _overrides("", dict.fromkeys(block.over), places, sources)
+    own = [Override(path_of(key), None, where) for key, where in places.items()]
+    misplaced = [text for override in own for text in _misplaced(override, sources)]
     if misplaced:
         return [], misplaced
     places.setdefault("seed", sources.where([("sweep", "own_seeds")]))
     seed = data.get("seed", 1) if isinstance(data, dict) else 1
     points, findings = [], _Findings()
     for row in rows(block, seed if isinstance(seed, int) and seed >= 0 else 1):
-        overrides, _ = _overrides(row.label, row.settings, places, sources)
+        overrides = [Override(path_of(key), row.settings[key], places[key]) for key in row.settings]
         point, found = _point(row.label, row.slug, overrides, data, sources)
         for about, text in found:
             findings.add(about, text)
@@ -138,14 +142,15 @@ def _made(sweep: Mapping[Any, Any], data: Any, sources: Sources) -> tuple[list[P
 
 
 def _overrides(
-    label: str, settings: Mapping[Any, Any], places: Mapping[Any, str], sources: Sources
+    i: int, settings: Mapping[Any, Any], sources: Sources
 ) -> tuple[list[Override], list[str]]:
-    """Return a point's settings, and why some of them are out of place."""
+    """Return the settings of a listed point, and why some of them are out of place."""
     overrides: list[Override] = []
     findings: list[str] = []
     for key, value in settings.items():
-        override = Override(path_of(str(key)), value, places[key])
-        wrong = _misplaced(str(key), override, sources)
+        at: Path = ("sweep", i, key)
+        override = Override(path_of(str(key)), value, sources.where([at]), at)
+        wrong = _misplaced(override, sources)
         findings += wrong
         overrides += [] if wrong else [override]
     return overrides, findings
@@ -169,7 +174,16 @@ def _point(
     return Point(label, slug, experiment, tuple(overrides)), findings
 
 
-def _label(i: int, entry: dict[Any, Any], sources: Sources) -> tuple[str, list[str]]:
+def _is_label(key: object) -> bool:
+    """Return whether a key can only be a misspelt `label`."""
+    return isinstance(key, str) and bool(near(key, ["label"]))
+
+
+def _label(i: int, entry: dict[Any, Any], misspelt: str, sources: Sources) -> tuple[str, list[str]]:
+    if misspelt != "label":
+        where = sources.where([("sweep", i, misspelt)])
+        unknown = f"{where}: unknown key '{misspelt}' in sweep[{i}] (did you mean 'label'?)"
+        return f"point {i}", [unknown]
     label = entry.get("label")
     if isinstance(label, int | float) and not isinstance(label, bool):
         label = str(label)
@@ -179,9 +193,10 @@ def _label(i: int, entry: dict[Any, Any], sources: Sources) -> tuple[str, list[s
     return f"point {i}", [f"{where}: sweep[{i}] needs a label with a letter or digit"]
 
 
-def _misplaced(key: str, override: Override, sources: Sources) -> list[str]:
+def _misplaced(override: Override, sources: Sources) -> list[str]:
     if override.path[0] in FIXED:
         return [f"{override.where}: a sweep point cannot change '{override.path[0]}'"]
+    key = ".".join(map(str, override.path))
     return [
         f"{option.where}: the sweep itself sets {key}; add --set sweep=[] to run without the sweep"
         for option in sources.options
@@ -194,7 +209,9 @@ def _groups(overrides: Iterable[Override]) -> list[str]:
     groups = [
         override
         for override in overrides
-        if isinstance(override.value, dict) and override.path not in REPLACED
+        if isinstance(override.value, dict)
+        and override.path not in REPLACED
+        and has_keys(Experiment, override.path)
     ]
     return [
         f"{group.where}: write one setting a key, such as"

@@ -73,6 +73,8 @@ class PssSettings(BaseModel):
     @classmethod
     def _is_known(cls, value: str, info: ValidationInfo) -> str:
         """Refuse an unknown name at once, unless a file may bring it."""
+        if value in (NONE, OF_THE_CASE, *ALIASES):
+            return value
         known = [NONE, *ALIASES, OF_THE_CASE, *shipped_keys("pss"), *installed_keys("pss")]
         if info.data.get("file") is None and value not in known:
             raise ValueError(
