@@ -95,7 +95,7 @@ class Normal(Axis):
 
     @model_validator(mode="after")
     def _has_room(self) -> Self:
-        _ordered(self.within)
+        _ordered(self.within, of=" in 'within'")
         (mean, deviation, low, high), _ = common([*self.normal, *self.within])
         if deviation <= 0:
             raise ValueError(f"must have a deviation above 0 (got {self.normal[1]})")
@@ -268,10 +268,10 @@ def written(number: float, unit: str, low: float, high: float) -> float | str:
     return f"{rounded:.15g} {unit}" if unit else rounded
 
 
-def _ordered(ends: Sequence[Any], above_zero: bool = False) -> None:
+def _ordered(ends: Sequence[Any], above_zero: bool = False, of: str = "") -> None:
     (low, high), _ = common(ends)
     if not low < high:
-        raise ValueError(f"must have a first value below the last (got {_listed(ends)})")
+        raise ValueError(f"must have a first value below the last{of} (got {_listed(ends)})")
     if above_zero and low <= 0:
         raise ValueError(f"must lie above 0 (got {_listed(ends)})")
 

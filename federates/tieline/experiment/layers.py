@@ -24,6 +24,9 @@ REPLACED: tuple[Path, ...] = (
 )
 """Groups that are one thing: a file that states one replaces it, key by key would mix two kinds."""
 
+OWN: Path = ("name",)
+"""What a file never takes from another: a second experiment of one name would be mistaken."""
+
 _FILES: tuple[Path, ...] = (
     ("case",),
     ("grid", "pss", "file"),
@@ -61,7 +64,7 @@ class Layers:
 
     def _owner(self, path: Path) -> Document:
         """Return the file that gives what stands at a path, or the nearest part around it."""
-        holders = list(self.documents)
+        holders = list(self.documents[:1] if path[:1] == OWN else self.documents)
         for depth in range(1, len(path) + 1):
             before = path[:depth]
             having = [d for d in holders if _has(d.data, before)]
@@ -165,8 +168,7 @@ def _merged(documents: Sequence[Document]) -> Any:
     for document in reversed(documents):
         data = {key: value for key, value in document.data.items() if key != EXTENDS}
         if document is not documents[0]:
-            # A second experiment of one name would be taken for the first.
-            data.pop("name", None)
+            data.pop(*OWN, None)
             if document.path.parent.resolve() != own:
                 data = _with_own_files(data, document.path.parent.resolve())
         merged = _over(merged, data, ())
