@@ -168,7 +168,7 @@ def _merged(documents: Sequence[Document]) -> Any:
     for document in reversed(documents):
         data = {key: value for key, value in document.data.items() if key != EXTENDS}
         if document is not documents[0]:
-            data.pop(*OWN, None)
+            data.pop(OWN[0], None)
             if document.path.parent.resolve() != own:
                 data = _with_own_files(data, document.path.parent.resolve())
         merged = _over(merged, data, ())

@@ -49,7 +49,7 @@ def judge(points: Sequence[Point], sources: Sources) -> Iterable[str]:
     idle = [without_effect(point.experiment) for point in points]
     sets = [{problem.paths for problem in problems} for problems in idle]
     never_read = set.intersection(*sets) if sets else set()
-    findings = _Findings()
+    findings = Gathered()
     for point, unread in zip(points, idle, strict=True):
         own = [
             problem
@@ -65,7 +65,7 @@ def judge(points: Sequence[Point], sources: Sources) -> Iterable[str]:
     return findings.lines()
 
 
-class _Findings:
+class Gathered:
     """Findings about points, of which those about one setting of one sweep block are told once."""
 
     def __init__(self) -> None:
@@ -131,7 +131,7 @@ def _made(sweep: Mapping[Any, Any], data: Any, sources: Sources) -> tuple[list[P
         return [], misplaced
     places.setdefault("seed", sources.where([("sweep", "own_seeds")]))
     seed = data.get("seed", 1) if isinstance(data, dict) else 1
-    points, findings = [], _Findings()
+    points, findings = [], Gathered()
     for row in rows(block, seed if isinstance(seed, int) and seed >= 0 else 1):
         overrides = [Override(path_of(key), row.settings[key], places[key]) for key in row.settings]
         point, found = _point(row.label, row.slug, overrides, data, sources)
