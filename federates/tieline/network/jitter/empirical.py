@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from tieline.network.entry import Entry, named_file
 from tieline.network.jitter.base import Jitter
@@ -72,20 +72,19 @@ def _delay_ns(path: Path, line: int, given: str) -> int:
     return seconds_to_ns(delay_s)
 
 
+def _checked(path: Path) -> Path:
+    read_sample(path)
+    return path
+
+
 class EmpiricalEntry(Entry):
     """A sample in a CSV file with a column `delay_s`."""
 
     distribution: Literal["empirical"] = Field(description="which distribution this is")
-    file: Annotated[Path, BeforeValidator(named_file)] = Field(
+    file: Annotated[Path, BeforeValidator(named_file), AfterValidator(_checked)] = Field(
         description="CSV file, relative to the file that names it"
     )
-    _sample: EmpiricalJitter = PrivateAttr()
-
-    @model_validator(mode="after")
-    def _read(self) -> "EmpiricalEntry":
-        self._sample = EmpiricalJitter(tuple(read_sample(self.file)))
-        return self
 
     def jitter(self) -> Jitter:
         """Return the distribution."""
-        return self._sample
+        return EmpiricalJitter(tuple(read_sample(self.file)))
