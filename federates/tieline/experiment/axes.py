@@ -84,7 +84,7 @@ class LogUniform(Axis):
     def at(self, share: float) -> Any:
         """Return the value at a share of the way between the logarithms."""
         (low, high), unit = common(self.log_uniform)
-        return written(low * math.exp(share * math.log(high / low)), unit, low, high)
+        return written(_between_logarithms(low, high, share), unit, low, high)
 
 
 class Normal(Axis):
@@ -184,13 +184,15 @@ class Linspace(Axis):
 
     def at(self, share: float) -> Any:
         """Return one of the values."""
-        return self.values()[int(share * self.count)]
+        return self._value(int(share * self.count))
 
     def values(self) -> tuple[Any, ...]:
         """Return all values."""
+        return tuple(self._value(i) for i in range(self.count))
+
+    def _value(self, i: int) -> Any:
         (low, high), unit = common(self.linspace)
-        step = (high - low) / (self.count - 1)
-        return tuple(written(low + i * step, unit, low, high) for i in range(self.count))
+        return written(low + i / (self.count - 1) * (high - low), unit, low, high)
 
 
 class Logspace(Axis):
@@ -206,13 +208,16 @@ class Logspace(Axis):
 
     def at(self, share: float) -> Any:
         """Return one of the values."""
-        return self.values()[int(share * self.count)]
+        return self._value(int(share * self.count))
 
     def values(self) -> tuple[Any, ...]:
         """Return all values."""
+        return tuple(self._value(i) for i in range(self.count))
+
+    def _value(self, i: int) -> Any:
         (low, high), unit = common(self.logspace)
-        step = math.log(high / low) / (self.count - 1)
-        return tuple(written(low * math.exp(i * step), unit, low, high) for i in range(self.count))
+        value = _between_logarithms(low, high, i / (self.count - 1))
+        return written(value, unit, low, high)
 
 
 AXES: dict[str, type[Axis]] = {
@@ -266,6 +271,11 @@ def written(number: float, unit: str, low: float, high: float) -> float | str:
     """Return a number between two ends, rounded for readers, with its unit if it has one."""
     rounded = min(max(float(f"{number:.{DIGITS}g}"), low), high)
     return f"{rounded:.15g} {unit}" if unit else rounded
+
+
+def _between_logarithms(low: float, high: float, share: float) -> float:
+    """Return what lies a share of the way from one number above 0 to another, in ratios."""
+    return math.exp(math.log(low) + share * (math.log(high) - math.log(low)))
 
 
 def _ordered(ends: Sequence[Any], above_zero: bool = False, of: str = "") -> None:

@@ -7,7 +7,6 @@ from typing import Any
 from tieline.experiment.layers import EXTENDS
 from tieline.experiment.sampling import SweepBlock
 from tieline.experiment.schema import FIXED, Experiment
-from tieline.resources import shipped
 
 Schema = dict[str, Any]
 
@@ -33,39 +32,40 @@ def json_schema() -> Schema:
     defs["SweepAxis"] = _axis(block)
     defs["SweepBlock"] = _block(block, keys)
     defs["SweepPoint"] = _point(keys)
-    first = {"name", "question"}
-    properties = experiment["properties"]
     return {
         "$schema": DIALECT,
         "title": "tieline experiment",
         "description": "An experiment of tieline: grid, measurements, network, and what is swept.",
         "type": "object",
         "additionalProperties": False,
-        "properties": {
-            **{name: properties[name] for name in properties if name in first},
-            EXTENDS: {
-                "description": (
-                    "another experiment, by its file or shipped name, whose settings hold where "
-                    "this file is silent"
-                ),
-                "type": "string",
-                "minLength": 1,
-            },
-            **{name: properties[name] for name in properties if name not in first},
-            "sweep": {
-                "description": "many runs of one experiment: a list of points, or a block",
-                "default": None,
-                "anyOf": [
-                    {"type": "array", "items": {"$ref": f"{_REF}SweepPoint"}},
-                    {"$ref": f"{_REF}SweepBlock"},
-                    {"type": "null"},
-                ],
-            },
-        },
+        "properties": _of_the_file(experiment["properties"]),
         "required": ["name"],
         "anyOf": [{"required": ["question"]}, {"required": [EXTENDS]}],
         "$defs": dict(sorted(defs.items())),
     }
+
+
+def _of_the_file(settings: Schema) -> Schema:
+    """Return an experiment's settings with the two keys that a file has besides."""
+    extends = {
+        "description": (
+            "another experiment, by its file or shipped name, whose settings hold where this file "
+            "is silent"
+        ),
+        "type": "string",
+        "minLength": 1,
+    }
+    sweep = {
+        "description": "many runs of one experiment: a list of points, or a block",
+        "default": None,
+        "anyOf": [
+            {"type": "array", "items": {"$ref": f"{_REF}SweepPoint"}},
+            {"$ref": f"{_REF}SweepBlock"},
+            {"type": "null"},
+        ],
+    }
+    first = {name: settings[name] for name in ("name", "question")}
+    return {**first, EXTENDS: extends, **settings, "sweep": sweep}
 
 
 def as_text(schema: Schema) -> str:
@@ -73,13 +73,9 @@ def as_text(schema: Schema) -> str:
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
 
 
-def editor_line(schema: str | None = None) -> str:
-    """Return the comment by which editors find the schema of an experiment file.
-
-    Args:
-        schema: its path or URL; else that of the shipped one.
-    """
-    return f"# yaml-language-server: $schema={schema or shipped('configs') / FILE_NAME}"
+def editor_line(schema: str) -> str:
+    """Return the comment by which editors find an experiment's schema, by its path or URL."""
+    return f"# yaml-language-server: $schema={schema}"
 
 
 def target(schema: Schema, definitions: Schema) -> Schema:

@@ -103,7 +103,7 @@ def find_experiment(reference: str) -> pathlib.Path:
         InputError: there is no such file; the message lists the shipped experiments.
     """
     path = pathlib.Path(reference)
-    if path.is_file():
+    if _is_file(path):
         return path
     by_name = _shipped_file(reference)
     if by_name is not None:
@@ -137,8 +137,8 @@ def _base_of(document: Document) -> pathlib.Path | None:
             f"{_where(document)}: extends must be a file or a shipped name (got {name!r})"
         )
     beside = document.path.parent / name
-    for path in (beside, beside.with_name(f"{beside.name}.yaml"), _shipped_file(name)):
-        if path is not None and path.is_file():
+    for path in (beside, pathlib.Path(f"{beside}.yaml"), _shipped_file(name)):
+        if path is not None and _is_file(path):
             return path
     raise InputError(f"{_where(document)}: extends no experiment {_unfound(name)}")
 
@@ -149,7 +149,15 @@ def _where(document: Document) -> str:
 
 def _shipped_file(name: str) -> pathlib.Path | None:
     path = shipped("configs") / f"{name}.yaml"
-    return path if re.fullmatch(r"[\w-]+", name) and path.is_file() else None
+    return path if re.fullmatch(r"[\w-]+", name) and _is_file(path) else None
+
+
+def _is_file(path: pathlib.Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:
+        # A name that is too long, or leads through a folder that is closed.
+        return False
 
 
 def _unfound(reference: str) -> str:

@@ -19,6 +19,7 @@ MOST_POINTS = 10_000
 """Points of a sweep at most: each is a run of seconds at least, and a folder."""
 
 LONGEST_SLUG = 80
+LONGEST_VALUE = 40
 
 
 class SweepBlock(BaseModel):
@@ -109,6 +110,8 @@ def rows(block: SweepBlock, seed: int) -> list[Row]:
     labels, slugs = numbers, numbers
     if block.method == "grid":
         labels = [_label(short_names(keys), row) for row in values]
+        if len(set(labels)) < len(labels):
+            labels = [f"{number}: {label}" for number, label in zip(numbers, labels, strict=True)]
         slugs = _slugs(labels, numbers)
     if block.own_seeds:
         own = stream(seed, "seeds of sweep points").integers(0, 2**31, len(values))
@@ -163,7 +166,15 @@ def _label(names: Sequence[str], row: Sequence[Any]) -> str:
 def _shown(value: Any) -> str:
     if isinstance(value, bool) or value is None:
         return "none" if value is None else str(value).lower()
+    if isinstance(value, dict):
+        return _shortened(" ".join(map(_shown, value.values())))
+    if isinstance(value, list):
+        return _shortened(f"[{', '.join(map(_shown, value))}]")
     return f"{value:.15g}" if isinstance(value, int | float) else str(value)
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 3]}..."
 
 
 def _slugs(labels: Sequence[str], numbers: Sequence[str]) -> list[str]:

@@ -134,6 +134,11 @@ def _made(sweep: Mapping[Any, Any], data: Any, sources: Sources) -> tuple[list[P
     points, findings = [], Gathered()
     for row in rows(block, seed if isinstance(seed, int) and seed >= 0 else 1):
         overrides = [Override(path_of(key), row.settings[key], places[key]) for key in row.settings]
+        groups = _groups(overrides)
+        for group in groups:
+            findings.add(group, group)
+        if groups:
+            continue
         point, found = _point(row.label, row.slug, overrides, data, sources)
         for about, text in found:
             findings.add(about, text)
