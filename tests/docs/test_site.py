@@ -27,6 +27,6 @@ def test_pages_made_from_the_code_are_up_to_date(name: str) -> None:
 def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     """A page outside the navigation, or a link to nowhere, would not be noticed by its author."""
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(command, check=False, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "index.html").is_file()
