@@ -13,6 +13,7 @@ from tieline.paper.statement import Band, Statement
 from tieline.paper.trips import EVENT_S, Floats, time_of
 from tieline.resources import case_folder
 
+SHOWN_S = 15.0
 FROM_S = EVENT_S + 0.5
 """The jump of power at the event is none of a derivative."""
 
@@ -40,7 +41,12 @@ def _damping(work: Work) -> Found:
         "The five units whose coefficient varies most. Right after the loss units give more than "
         "their turbines do and are damped less, until governors follow."
     )
-    figures = {"damping": Drawn(damping_in_time(time_s, curves), caption)}
+    shown = time_s <= SHOWN_S
+    figures = {
+        "damping": Drawn(
+            damping_in_time(time_s[shown], {u: D[shown] for u, D in curves.items()}), caption
+        )
+    }
     return Found({"apart": float(max(apart))}, figures)
 
 
