@@ -44,7 +44,7 @@ def test_the_wider_band_counts_only_with_its_explanation_and_numbers() -> None:
     wide = statement(differs=Band(0.5, 1.5), difference="rotors give {other:.1f}, {lost:.1f}")
     row = judged("i", wide, {"it": 1.4, "other": 1.04})
     assert row.verdict is Verdict.DIFFERENT
-    assert row.why == "outside 0.9 to 1.1. rotors give 1.0, nan"
+    assert row.why == "not 0.9 to 1.1: rotors give 1.0, nan"
     assert judged("i", wide, {"it": 1.6}).verdict is Verdict.NOT
 
 

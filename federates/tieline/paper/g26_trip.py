@@ -209,7 +209,8 @@ BETA1 = Item(
             "less than 30 mHz", Band(high=30.0), "as the notes bound it", unit="mHz", digits=".1f",
         ),
         Statement(
-            "g26-damping", "and leave the damping ratio of the inter-area swing where it was", TRIP,
+            "g26-damping", "delays up to 1.25 s leave the damping ratio of the inter-area swing "
+            "where it was", TRIP,
             "damping_moves", "no change", Band(high=0.02),
             "the trajectories of the author's toolbox, read by the same estimator, move by 0.016",
         ),

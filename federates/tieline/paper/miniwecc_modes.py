@@ -93,7 +93,8 @@ PLAIN = Item(
             "0.04 Hz", about(0.04, 0.005), "half of the last digit given", unit="Hz", digits=".4f",
         ),
         Statement(
-            "mw-slow-shape", "in it all speeds are in phase", LINEAR, "slow_apart", "in phase",
+            "mw-slow-shape", "in the frequency-regulation mode all speeds are in phase", LINEAR,
+            "slow_apart", "in phase",
             Band(high=IN_PHASE_DEG), "every speed that is seen, within 60 degrees of their mean",
             unit="degrees", digits=".1f",
         ),
@@ -113,11 +114,12 @@ BETA1 = Item(
             unit="1/s", digits=".4f",
         ),
         Statement(
-            "mw-b1-local", "and the local modes", LINEAR, "local_step", "left", Band(high=-1e-6),
+            "mw-b1-local", "beta1 moves the local modes to the left", LINEAR, "local_step",
+            "left", Band(high=-1e-6),
             "every step of every mode must go left", unit="1/s",
         ),
         Statement(
-            "mw-b1-slow", "and leaves the frequency-regulation mode where it is", LINEAR,
+            "mw-b1-slow", "beta1 leaves the frequency-regulation mode where it is", LINEAR,
             "slow_move", "does not move", STAYS, STAYS_WHY, digits=".4f",
         ),
     ),
@@ -136,7 +138,7 @@ BETA2 = Item(
             "a real eigenvalue has the damping ratio 1",
         ),
         Statement(
-            "mw-b2-swings", "and leaves inter-area and local modes where they are", LINEAR,
+            "mw-b2-swings", "beta2 leaves inter-area and local modes where they are", LINEAR,
             "swing_move", "do not move", STAYS, STAYS_WHY, digits=".4f",
         ),
     ),

@@ -175,7 +175,8 @@ WEIGHTS = Item(
             "half a decibel, beta1 from 1 to 0.2, cannot be seen in the plot", unit="dB",
         ),
         Statement(
-            "ol-b1-swings", "but lowers it at the swings", LINEAR, "beta1_swing_db", "lower",
+            "ol-b1-swings", "less beta1 lowers the gain at the swings", LINEAR, "beta1_swing_db",
+            "lower",
             Band(high=-3.0), "by 3 dB at least at each, beta1 from 1 to 0.2", unit="dB",
             digits=".1f",
         ),
@@ -185,7 +186,8 @@ WEIGHTS = Item(
             "five degrees, beta1 from 1 to 0.2", unit="degrees", digits=".1f",
         ),
         Statement(
-            "ol-b1-phase-037", "the same at 0.37 Hz", REFERENCE, "beta1_phase_037", "0 degrees",
+            "ol-b1-phase-037", "beta1 leaves the phase at the swings alone: at 0.37 Hz",
+            REFERENCE, "beta1_phase_037", "0 degrees",
             Band(high=5.0), "five degrees, beta1 from 1 to 0.2",
             difference="the author's toolbox gives 13 to 21 degrees there on these data, too; "
             "what makes the paper's figure differ is not known",
@@ -200,7 +202,8 @@ WEIGHTS = Item(
             unit="dB", digits=".2f",
         ),
         Statement(
-            "ol-b2-phase", "and advances the phase there by roughly 35 degrees", LINEAR,
+            "ol-b2-phase", "and advances the phase at the frequency-regulation mode by roughly 35 "
+            "degrees", LINEAR,
             "beta2_phase", "+35 degrees", about(35, 2.5), "'roughly': half of the step to 40",
             about(35, 7.5),
             "the PMUs' filter; with the average of the rotors it is "
@@ -228,12 +231,13 @@ DELAY = Item(
             unit="dB", digits=".2f",
         ),
         Statement(
-            "ol-delay-phase", "phase at the swings", LINEAR, "swing_phase", "hardly",
+            "ol-delay-phase", "the same: phase at the swings", LINEAR, "swing_phase", "hardly",
             Band(high=15.0), "15 degrees, a quarter of a usual phase margin", unit="degrees",
             digits=".1f",
         ),
         Statement(
-            "ol-delay-band", "gain anywhere from 0.02 to 2 Hz", LINEAR, "most_db", "hardly",
+            "ol-delay-band", "the same: gain anywhere from 0.02 to 2 Hz", LINEAR, "most_db",
+            "hardly",
             Band(high=2.0), "2 dB, a quarter of the amplitude", Band(high=10.0),
             "in the notch at {most_hz:.3f} Hz, where the gain is {most_at_db:.0f} dB against "
             "{peak_gain_db:.0f} dB at the highest peak, a late average moves it", unit="dB",
@@ -259,11 +263,13 @@ ZEROS = Item(
             digits=".4f",
         ),
         Statement(
-            "ol-zero-last", "and has crossed it when the delay has grown to 1.25 s", LINEAR,
+            "ol-zero-last", "with (0.5, 1) and a delay of 1.25 s the zero has crossed that axis",
+            LINEAR,
             "last_real", "right", Band(low=1e-4), "its sign is stated", unit="1/s", digits=".4f",
         ),
         Statement(
-            "ol-zero-hz", "between 0.1 and 0.2 Hz", LINEAR, "crossing_hz", "0.1 to 0.2 Hz",
+            "ol-zero-hz", "it crosses between 0.1 and 0.2 Hz", LINEAR, "crossing_hz",
+            "0.1 to 0.2 Hz",
             Band(0.1, 0.2), "as stated", unit="Hz", digits=".4f",
         ),
     ),

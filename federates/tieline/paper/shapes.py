@@ -80,7 +80,8 @@ def _names(axes: PolarAxes, shape: Complexes, units: Sequence[str]) -> None:
         named = names if len(units) <= MOST_UNITS else names[:1]
         above = 6 if value.imag >= 0 else -6
         axes.annotate(
-            ", ".join(named), (np.angle(value), abs(value)), xytext=(0, above), textcoords="offset points", fontsize=6, ha="center", va="center",
+            ", ".join(named), (np.angle(value), abs(value)), xytext=(0, above),
+            textcoords="offset points", fontsize=6, ha="center", va="center",
         )  # fmt: skip
 
 

@@ -142,7 +142,7 @@ def judged(item: str, statement: Statement, numbers: Mapping[str, float]) -> Row
     if verdict is Verdict.REPRODUCED:
         return Row(item, statement, value, verdict, statement.tolerance)
     reason = statement.against if value in statement.band else statement.difference
-    outside = "" if value in statement.band else f"outside {statement.band}. "
+    outside = "" if value in statement.band else f"not {statement.band}: "
     return Row(item, statement, value, verdict, outside + reason.format_map(_Shown(numbers)))
 
 

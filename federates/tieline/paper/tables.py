@@ -150,7 +150,7 @@ FORMS_TABLE = Item(
             digits=".1e",
         ),
         Statement(
-            "tab-synchronous", "and so does the form with the reference of synchronous speed",
+            "tab-synchronous", "the form with the reference of synchronous speed gives it, too",
             DESIGN, "synchronous", "0 pu apart", Band(high=1e-9), "rounding; speeds of 33 units",
             unit="pu", digits=".1e",
         ),

@@ -105,8 +105,9 @@ def _plain(work: Work) -> Found:
     places = found.of_kind(SLOW, BETWEEN, LOCAL).tolist()
     caption = (
         "Rotor speeds in each mode, the largest drawn as 1. All four units move together in the "
-        "first; in the second the areas swing against each other. In the last two the small "
-        "unit of each area swings against its large one; their frequencies all but coincide, so that both areas show in both."
+        "first; in the second the areas swing against each other. In the last two the small unit "
+        "of each area swings against its large one; their frequencies all but coincide, so that "
+        "both areas show in both."
     )
     return Found(numbers, {"two_area_shapes": Drawn(mode_shapes(found, places), caption)})
 
@@ -170,11 +171,12 @@ PLAIN = Item(
             against=BY_CONSTRUCTION.replace("original", "original_between_hz"), unit="Hz",
         ),
         Statement(
-            "ta-between-unstable", "and is unstable", LINEAR, "between_damping",
+            "ta-between-unstable", "the inter-area mode is unstable", LINEAR, "between_damping",
             "damping ratio below 0", Band(high=-1e-9), "its sign is stated",
         ),
         Statement(
-            "ta-between-shape", "G1 and G2 swing against G3 and G4", LINEAR, "between_apart",
+            "ta-between-shape", "in the inter-area mode G1 and G2 swing against G3 and G4",
+            LINEAR, "between_apart",
             "in opposition", about(180, 25), "within 25 degrees of opposition", unit="degrees",
             digits=".1f",
         ),
@@ -184,7 +186,8 @@ PLAIN = Item(
             against=BY_CONSTRUCTION.replace("original", "original_slow_hz"), unit="Hz",
         ),
         Statement(
-            "ta-slow-shape", "in it all speeds are in phase and nearly equal", LINEAR,
+            "ta-slow-shape", "in the frequency-regulation mode all speeds are in phase and nearly "
+            "equal", LINEAR,
             "slow_uneven", "nearly equal", Band(high=0.1),
             "largest complex difference from the largest speed, a tenth of it", digits=".4f",
         ),
@@ -203,21 +206,22 @@ BETA1 = Item(
             "left", Band(high=-1e-6), "every step of the sweep must go left", unit="1/s",
         ),
         Statement(
-            "ta-b1-local", "and the local modes", LINEAR, "local_step", "left",
+            "ta-b1-local", "beta1 moves the local modes to the left", LINEAR, "local_step", "left",
             Band(high=-1e-6), "every step of the sweep must go left", unit="1/s",
         ),
         Statement(
-            "ta-b1-slow", "and leaves the frequency-regulation mode where it is (average of the "
+            "ta-b1-slow", "beta1 leaves the frequency-regulation mode where it is (average of the "
             "rotor speeds)", LINEAR, "slow_move", "does not move", STAYS, STAYS_WHY, digits=".4f",
         ),
         Statement(
-            "ta-b1-slow-pmu", "the same with the average of PMU frequencies", LINEAR,
+            "ta-b1-slow-pmu", "beta1 leaves it there (average of PMU frequencies)", LINEAR,
             "slow_move_sensors", "does not move", STAYS, STAYS_WHY, Band(high=0.2),
             f"{LAG}: the mode goes from {{slow_first_hz:.4f}} to {{slow_last_hz:.4f}} Hz, as in "
             "the author's toolbox; the paper's sweeps imply the average of the rotors",
         ),
         Statement(
-            "ta-b1-local-hz", "the local modes rise only slightly in frequency", REFERENCE,
+            "ta-b1-local-hz", "with beta1 the local modes rise only slightly in frequency",
+            REFERENCE,
             "local_rise", "slightly", Band(0.0, 0.1), "up to a tenth is slight",
             difference="the author's toolbox gives the same on these data; "
             "the paper's own data of this system are not published",
@@ -238,20 +242,22 @@ BETA2 = Item(
             Band(low=1.0), "a real eigenvalue has the damping ratio 1",
         ),
         Statement(
-            "ta-b2-slow-pmu", "the same with the average of PMU frequencies", LINEAR,
+            "ta-b2-slow-pmu", "beta2 damps it so (average of PMU frequencies)", LINEAR,
             "slow_damping_sensors", "damping ratio 1", Band(low=1.0),
             "a real eigenvalue has the damping ratio 1",
         ),
         Statement(
-            "ta-b2-between", "and leaves the inter-area mode where it is", LINEAR,
+            "ta-b2-between", "beta2 leaves the inter-area mode where it is", LINEAR,
             "between_move", "does not move", STAYS, STAYS_WHY, digits=".4f",
         ),
         Statement(
-            "ta-b2-others", "and makes no other mode grow (average of the rotor speeds)", REFERENCE,
+            "ta-b2-others", "beta2 makes no other mode grow (average of the rotor speeds)",
+            REFERENCE,
             "growing", "0 modes", Band(0, 0), "a count", digits=".0f",
         ),
         Statement(
-            "ta-b2-others-pmu", "the same with the average of PMU frequencies", REFERENCE,
+            "ta-b2-others-pmu", "beta2 makes no other mode grow (average of PMU frequencies)",
+            REFERENCE,
             "growing_sensors", "0 modes", Band(0, 0), "a count", Band(1, 1),
             f"{LAG}: with beta2 = 1 a mode at {{growing_hz:.2f}} Hz grows, in the author's "
             "toolbox, too; the paper's sweeps imply the average of the rotors", digits=".0f",

@@ -176,7 +176,8 @@ BETA2 = Item(
             "a tenth of a hertz is what a load-shedding stage is apart", unit="mHz", digits=".0f",
         ),
         Statement(
-            "ta-trip-b2-second", "and modestly from 0.33 to 0.67: in parts of the first rise",
+            "ta-trip-b2-second", "the nadir rises modestly from 0.33 to 0.67: in parts of the "
+            "first rise",
             TWO_AREA, "rises", "modestly", Band(0.0, 0.5), "less than half of the first rise",
         ),
         Statement(
