@@ -22,7 +22,7 @@ from tieline.paper.reproduce import (
     Result,
     check_target,
     chosen,
-    count,
+    counted,
     reproduce,
     save_verdicts,
 )
@@ -64,8 +64,7 @@ def give(
         paths.append(target / MARKDOWN)
         paths[-1].write_text(markdown(results), encoding="utf-8")
     console.print(table_of(results))
-    counts = ", ".join(f"{number} {verdict.value}" for verdict, number in count(results).items())
-    _say(console, f"{counts}; {wall_s:.0f} s")
+    _say(console, f"{counted(results)}; {wall_s:.0f} s")
     for path in paths:
         _say(console, shortest(path))
     _raise_first(results)

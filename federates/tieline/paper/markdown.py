@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from tieline.paper.reproduce import Result, count
+from tieline.paper.reproduce import Result, counted
 from tieline.paper.statement import Row
 
 HEAD = ("id", "statement", "here", "stated", "verdict", "why", "source")
@@ -10,8 +10,7 @@ HEAD = ("id", "statement", "here", "stated", "verdict", "why", "source")
 
 def markdown(results: Sequence[Result]) -> str:
     """Return a line of counts and one table an item, in Markdown."""
-    counts = ", ".join(f"{number} {verdict.value}" for verdict, number in count(results).items())
-    parts = [f"{counts}."]
+    parts = [f"{counted(results)}."]
     for result in results:
         lines = [f"### {result.item.title}", "", _line(HEAD), _line(["---"] * len(HEAD))]
         lines += [_line(_cells(row)) for row in result.rows]

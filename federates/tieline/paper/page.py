@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
-from tieline.paper.reproduce import FIGURES, Result, count
+from tieline.paper.reproduce import FIGURES, Result, count, counted
 from tieline.paper.sources import PAPER, SOURCES
 from tieline.paper.statement import Row, Verdict
 
@@ -27,6 +27,7 @@ def write_page(results: Sequence[Result], target: Path, about: str) -> Path:
     text = template.substitute(
         paper=_safe(PAPER),
         about=_safe(about),
+        counted=_safe(counted(results)),
         counts=" ".join(
             f'<span class="badge {CLASSES[verdict]}">{number} {verdict.value}</span>'
             for verdict, number in count(results).items()

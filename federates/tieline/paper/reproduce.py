@@ -15,6 +15,7 @@ from tieline.errors import InputError, TielineError
 from tieline.figures import STYLE
 from tieline.paper.item import Found, Item
 from tieline.paper.runs import Runs
+from tieline.paper.sources import PSTESS
 from tieline.paper.statement import Row, Verdict, judged
 from tieline.problems import near
 
@@ -109,6 +110,14 @@ def count(results: Sequence[Result]) -> dict[Verdict, int]:
     return {verdict: sum(row.verdict is verdict for row in rows) for verdict in Verdict}
 
 
+def counted(results: Sequence[Result]) -> str:
+    """Return the numbers of verdicts in words, and how many rows are no statement of the paper."""
+    rows = [row for result in results for row in result.rows]
+    others = sum(row.statement.source is PSTESS for row in rows)
+    compared = f"; {others} of {len(rows)} rows compare with {PSTESS.name}" if others else ""
+    return f"{_counted(rows, every=True)}{compared}"
+
+
 def save_verdicts(results: Sequence[Result], target: Path, facts: Mapping[str, object]) -> None:
     """Write `verdicts.json` and `verdicts.csv` into the target."""
     records = [_record(row) for result in results for row in result.rows]
@@ -147,9 +156,9 @@ def _save(figure: Figure, stem: Path) -> None:
     figure.savefig(stem.with_suffix(".svg"))
 
 
-def _counted(rows: Sequence[Row]) -> str:
+def _counted(rows: Sequence[Row], every: bool = False) -> str:
     counts = {verdict: sum(row.verdict is verdict for row in rows) for verdict in Verdict}
-    return ", ".join(f"{n} {verdict.value}" for verdict, n in counts.items() if n)
+    return ", ".join(f"{n} {verdict.value}" for verdict, n in counts.items() if n or every)
 
 
 def _record(row: Row) -> dict[str, object]:
