@@ -36,8 +36,6 @@ def _plain(work: Work) -> Found:
     numbers = {
         "slow_hz": found.frequency_hz[slow],
         "slow_apart": angle[seen].max(),
-        "between": float(len(found.of_kind(BETWEEN))),
-        "growing": float((found.eigenvalues.real[found.within()] > 0).sum()),
     }
     places = [int(slow), *(int(k) for k in found.of_kind(BETWEEN)[:5])]
     caption = (

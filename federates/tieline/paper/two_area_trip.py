@@ -84,7 +84,7 @@ def _beta1(work: Work) -> Found:
     others = [work.run(spec) for spec in _beta2_specs(work.quick)]
     by_beta1 = max(np.abs(_slow(run) - _slow(runs[0])).max() for run in runs)
     by_beta2 = np.abs(_slow(others[-1]) - _slow(others[0])).max()
-    numbers = {"share": by_beta1 / by_beta2, "by_beta1": by_beta1, "by_beta2": by_beta2}
+    numbers = {"share": by_beta1 / by_beta2}
     numbers |= _compared(runs, [f"rotors_{b:g}_{OTHER:g}" for b in BETAS["beta1"]])
     labels = {f"beta1 = {b:g}": run for b, run in zip(BETAS["beta1"], runs, strict=True)}
     caption = (
@@ -100,7 +100,6 @@ def _beta2(work: Work) -> Found:
     lowest = [voltage_of(run, UNIT).min() for run in runs]
     numbers = {
         "first_rise_mhz": 1e3 * (nadirs[1] - nadirs[0]),
-        "second_rise_mhz": 1e3 * (nadirs[2] - nadirs[1]),
         "rises": (nadirs[2] - nadirs[1]) / (nadirs[1] - nadirs[0]),
         "lowest_step": float(np.diff(lowest).max()),
     }
@@ -121,7 +120,6 @@ def _loads(work: Work) -> Found:
     )
     numbers = {
         "largest_step_mhz": 1e3 * float(np.diff(benefits).max()),
-        "left": benefits[-1] / benefits[0],
     }
     figure = Figure(figsize=(6.3, 3.0), layout="constrained")
     axes = figure.subplots()
