@@ -145,15 +145,17 @@ def _computed(item: Item, runs: Runs, figures: Path) -> Result:
         except TielineError as failure:
             found, error = Found({}), failure
         for name, drawn in found.figures.items():
-            _save(drawn.figure, figures / name)
+            _save(drawn.figure, figures / name, runs.quick)
     rows = tuple(judged(item.id, statement, found.numbers) for statement in item.statements)
     captions = {name: drawn.caption for name, drawn in found.figures.items()}
     return Result(item, rows, captions, time.monotonic() - began_s, error)
 
 
-def _save(figure: Figure, stem: Path) -> None:
+def _save(figure: Figure, stem: Path, quick: bool) -> None:
     figure.savefig(stem.with_suffix(".png"), dpi=DOTS_PER_INCH)
-    figure.savefig(stem.with_suffix(".svg"))
+    # Drawing takes as long as all modes: the short form does it once.
+    if not quick:
+        figure.savefig(stem.with_suffix(".svg"))
 
 
 def _counted(rows: Sequence[Row], every: bool = False) -> str:
