@@ -189,7 +189,7 @@ PLAIN = Item(
             "ta-slow-shape", "in the frequency-regulation mode all speeds are in phase and nearly "
             "equal", LINEAR,
             "slow_uneven", "nearly equal", Band(high=0.1),
-            "largest complex difference from the largest speed, a tenth of it", digits=".4f",
+            "largest complex difference from the largest speed, a tenth of it", digits=".1e",
         ),
     ),
     _plain,
@@ -211,7 +211,7 @@ BETA1 = Item(
         ),
         Statement(
             "ta-b1-slow", "beta1 leaves the frequency-regulation mode where it is (average of the "
-            "rotor speeds)", LINEAR, "slow_move", "does not move", STAYS, STAYS_WHY, digits=".4f",
+            "rotor speeds)", LINEAR, "slow_move", "does not move", STAYS, STAYS_WHY, digits=".1e",
         ),
         Statement(
             "ta-b1-slow-pmu", "beta1 leaves it there (average of PMU frequencies)", LINEAR,
