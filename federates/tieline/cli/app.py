@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 import tieline
-from tieline.cli import config, linear, models, report, run
+from tieline.cli import config, linear, models, report, reproduce, run
 from tieline.cli.topology import topology
 from tieline.console import say
 from tieline.errors import InputError
@@ -51,6 +51,7 @@ for command in (
     linear.modes,
     linear.freqresp,
     linear.damping,
+    reproduce.reproduce,
 ):
     app.command(command.__name__.rstrip("_"))(command)
 app.add_typer(topology)
