@@ -2,9 +2,11 @@
 
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from tieline.cosim.conventions import LOOPBACK, Place
 from tieline.cosim.interfaces import FederationSettings
 from tieline.errors import InputError
 
@@ -27,8 +29,11 @@ def read_run(argv: list[str]) -> tuple[dict[str, Any], Path]:
         raise SystemExit(InputError.exit_code) from error
 
 
-def federation_of(run: dict[str, Any]) -> tuple[FederationSettings, int | None]:
-    """Return a run's federation settings and its broker's port."""
+def federation_of(run: Mapping[str, Any]) -> tuple[FederationSettings, Place]:
+    """Return a run's federation settings, and where it meets."""
     stated = dict(run["federation"])
     port = stated.pop("broker_port", None)
-    return FederationSettings(**stated), port
+    host = stated.pop("broker_host", LOOPBACK)
+    interface = stated.pop("interface", LOOPBACK)
+    settings = FederationSettings(**stated)
+    return settings, Place(settings.core, port, host, interface)

@@ -12,9 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
+from tieline.cosim.conventions import member_count
 from tieline.cosim.interfaces import FEDERATES, GRID, NETWORK, FederationSettings
 from tieline.cosim.ports import reserved_port
+from tieline.cosim.runfile import federation_of
 from tieline.errors import CosimError, TielineError
+from tieline.experiment.guests import GuestProcess, guest_processes
 from tieline.experiment.supervise import Child, ProcessUse, end_all
 from tieline.experiment.watch import Progress, Suspect, Watch
 
@@ -94,7 +97,7 @@ def launch(
     """
     run_file = folder / "run.json"
     run = json.loads(run_file.read_text(encoding="utf-8"))
-    settings = _settings(run)
+    settings, _ = federation_of(run)
     table = {**COMMANDS, **(commands or {})}
     with ExitStack() as stack:
         stack.enter_context(_termination_as_interrupt())
@@ -103,9 +106,11 @@ def launch(
         else:
             port = stack.enter_context(reserved_port())
             _write_port(run_file, run, port)
-            broker = [*table[BROKER], settings.core, str(port)]
+            members = f"--federates={member_count(run)}"
+            broker = [*table[BROKER], settings.core, str(port), members]
             starts = [(BROKER, broker), *((name, [*table[name], str(run_file)]) for name in order)]
-        return _Launch(folder, settings, on_progress).run(starts, stagger_s)
+        guests = guest_processes(run, folder)
+        return _Launch(folder, settings, on_progress, guests).run(starts, stagger_s)
 
 
 class _Launch:
@@ -116,10 +121,12 @@ class _Launch:
         folder: Path,
         settings: FederationSettings,
         on_progress: Callable[[Progress], None] | None,
+        guests: Sequence[GuestProcess] = (),
     ) -> None:
         self._folder = folder
         self._on_progress = on_progress
         self._watch = Watch(settings)
+        self._guests = list(guests)
         self._children: dict[str, Child] = {}
         self._marks: dict[str, float] = {}
 
@@ -139,16 +146,26 @@ class _Launch:
         for name, command in starts:
             if name in FEDERATES and any(other in FEDERATES for other in self._children):
                 time.sleep(stagger_s)
-            log = self._folder / "logs" / f"{name}.log"
-            try:
-                self._children[name] = Child(name, command, log)
-            except OSError as error:
-                self._fail(Suspect(name, f"could not be started: {error}", CosimError.exit_code))
+            self._start_one(name, command, None)
+
+    def _start_one(self, name: str, command: Sequence[str], directory: Path | None) -> None:
+        log = self._folder / "logs" / f"{name}.log"
+        try:
+            self._children[name] = Child(name, command, log, directory)
+        except OSError as error:
+            self._fail(Suspect(name, f"could not be started: {error}", CosimError.exit_code))
+
+    def _start_guests(self) -> None:
+        """Start the guests once the federates are opened, so that none waits for a compiler."""
+        while self._guests and self._watch.is_opened():
+            guest = self._guests.pop()
+            self._start_one(guest.name, guest.command, guest.directory)
 
     def _follow(self) -> None:
         before_s = time.monotonic()
         while any(child.exit_code is None for child in self._children.values()):
             self._wait()
+            self._start_guests()
             now_s = time.monotonic()
             self._watch.pass_time(now_s - before_s)
             before_s = now_s
@@ -225,11 +242,6 @@ class _Launch:
             salvage(self._folder)
         except (TielineError, OSError) as second:
             error.add_note(f"what was written could not be made readable: {second}")
-
-
-def _settings(run: Mapping[str, Any]) -> FederationSettings:
-    stated = {key: value for key, value in run["federation"].items() if key != "broker_port"}
-    return FederationSettings(**stated)
 
 
 def _write_port(run_file: Path, run: dict[str, Any], port: int) -> None:

@@ -5,6 +5,7 @@ import json
 import os
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -62,12 +63,15 @@ class Child:
         name: what the run calls it.
         command: the program and its arguments.
         log: where its standard error, and whatever else it says, is kept.
+        directory: where it runs; None for here.
 
     Attributes:
         exit_code: None while it runs; negative for the signal that killed it.
     """
 
-    def __init__(self, name: str, command: Sequence[str], log: Path) -> None:
+    def __init__(
+        self, name: str, command: Sequence[str], log: Path, directory: Path | None = None
+    ) -> None:
         self.name = name
         self.exit_code: int | None = None
         self.use: ProcessUse | None = None
@@ -78,6 +82,7 @@ class Child:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             env=_environment(),
+            cwd=directory,
             start_new_session=True,
         )
         self.log = Log(log)
@@ -203,6 +208,9 @@ def _environment() -> dict[str, str]:
     source = str(Path(tieline.__file__).resolve().parent.parent)
     others = environment.get("PYTHONPATH")
     environment["PYTHONPATH"] = source if not others else f"{source}{os.pathsep}{others}"
+    # A guest's `python` or `helics_recorder` is this environment's, activated or not.
+    programs = str(Path(sys.executable).parent)
+    environment["PATH"] = f"{programs}{os.pathsep}{environment.get('PATH', os.defpath)}"
     environment[LAUNCHER_VARIABLE] = str(os.getpid())
     environment.setdefault("PYTHONFAULTHANDLER", "1")
     # The matrices are small: threads of a linear algebra library cost here more than they give.

@@ -13,6 +13,7 @@ _LONGEST_PASS_S = 0.5
 _LEAST_CPU_S = 0.05
 _DONE = ("finished", "failed")
 _STATES = ("starting", "opening", "joining", "running", "finishing", *_DONE)
+_JOINING = _STATES.index("joining")
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,7 @@ class Watch:
     def __init__(self, settings: FederationSettings) -> None:
         self.silence_s = 0.0
         self._settings = settings
+        self._guests = tuple(guest.name for guest in settings.guests)
         self._last: dict[str, dict[str, Any]] = {}
         self._cpu_s: dict[str, float] = {}
 
@@ -85,6 +87,10 @@ class Watch:
         """Return whether every federate has joined."""
         return all(self._state(name) in ("running", "finishing", *_DONE) for name in FEDERATES)
 
+    def is_opened(self) -> bool:
+        """Return whether every federate is ready to join."""
+        return all(_STATES.index(self._state(name)) >= _JOINING for name in FEDERATES)
+
     def is_finished(self) -> bool:
         """Return whether every federate has reached its end."""
         return all(self._state(name) == "finished" for name in FEDERATES)
@@ -97,7 +103,7 @@ class Watch:
             or self._stopped(processes)
             or self._ended_too_soon(processes)
             or self._failed_by_others()
-            or self._silent()
+            or self._silent(processes)
         )
 
     def _state(self, name: str) -> str:
@@ -130,7 +136,8 @@ class Watch:
         return None
 
     def _ended_too_soon(self, processes: Mapping[str, Process]) -> Suspect | None:
-        for name, process in processes.items():
+        own = {name: process for name, process in processes.items() if name not in self._guests}
+        for name, process in own.items():
             # A broker ends as soon as the federates have left, while they write their results.
             good = _DONE if name in FEDERATES else ("finishing", *_DONE)
             states = [self._state(member) for member in _members(name)]
@@ -150,10 +157,15 @@ class Watch:
         reason = f"{word['reason']}{self._when(name)}"
         return Suspect(name, reason, int(word["exit_code"]), is_certain)
 
-    def _silent(self) -> Suspect | None:
+    def _silent(self, processes: Mapping[str, Process]) -> Suspect | None:
         limit_s, what = self._limit()
         if self.silence_s <= limit_s or self.is_finished():
             return None
+        guests = [name for name in self._guests if name in processes and processes[name].exit_code is None]
+        if guests and self._is_guests_turn():
+            name = " or ".join(guests)
+            reason = f"hung: {what} for {limit_s:g} s of wall time, and the others wait"
+            return Suspect(name, reason, CosimError.exit_code)
         name = min(FEDERATES, key=self._blame)
         reason = f"hung: {what} for {limit_s:g} s of wall time{self._when(name)}"
         return Suspect(name, reason, CosimError.exit_code)
@@ -162,6 +174,13 @@ class Watch:
         if self.is_running():
             return self._settings.hang_timeout, "no federate was granted anything"
         return self._settings.start_timeout, "it has not joined the federation"
+
+    def _is_guests_turn(self) -> bool:
+        """Return whether the federates have all asked for a grant, or all wait for the start."""
+        words = [self._last.get(name, {}) for name in FEDERATES]
+        if self.is_running():
+            return all(word.get("waits") for word in words)
+        return all(word.get("state") == "joining" for word in words)
 
     def _has_failed(self, name: str) -> bool:
         return any(self._state(member) == "failed" for member in _members(name))
