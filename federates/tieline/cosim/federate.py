@@ -21,8 +21,9 @@ from tieline.cosim.process import (
     reason_of,
     signals_held,
 )
-from tieline.cosim.runfile import federation_of, read_run
+from tieline.cosim.runfile import federation_of, read_config, read_run
 from tieline.cosim.status import Fault, Heartbeat, Status
+from tieline.cosim.word import leave_word
 from tieline.errors import CosimError
 
 _STDOUT = 1
@@ -140,10 +141,12 @@ def main(name: str, open_participant: OpenParticipant) -> None:
     die_with_launcher()
     run, folder = read_run(sys.argv)
     status = Status(name, _STDOUT)
-    federate = Federate(name, run, folder, status)
+    federate = Federate(name, run, folder, status, read_config(sys.argv))
     on_termination(lambda signal_name: _terminate(federate, signal_name))
     with Heartbeat([status]):
         code = federate.serve(open_participant)
+    if run.get("leaves_word"):
+        leave_word(folder, status, code)
     end_process(code)
 
 

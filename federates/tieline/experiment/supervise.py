@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -202,21 +202,27 @@ def drain(children: Sequence[Child]) -> None:
             continue
 
 
-def _environment() -> dict[str, str]:
-    environment = dict(os.environ)
+def shared_environment(before: Mapping[str, str]) -> dict[str, str]:
+    """Return the variables that every process of a run needs, given those of the launcher."""
     # The children run this very code, wherever it was imported from.
     source = str(Path(tieline.__file__).resolve().parent.parent)
-    others = environment.get("PYTHONPATH")
-    environment["PYTHONPATH"] = source if not others else f"{source}{os.pathsep}{others}"
+    others = before.get("PYTHONPATH")
     # A guest's `python` or `helics_recorder` is this environment's, activated or not.
     programs = str(Path(sys.executable).parent)
-    environment["PATH"] = f"{programs}{os.pathsep}{environment.get('PATH', os.defpath)}"
-    environment[LAUNCHER_VARIABLE] = str(os.getpid())
-    environment.setdefault("PYTHONFAULTHANDLER", "1")
+    shared = {
+        "PYTHONPATH": source if not others else f"{source}{os.pathsep}{others}",
+        "PATH": f"{programs}{os.pathsep}{before.get('PATH', os.defpath)}",
+        "PYTHONFAULTHANDLER": before.get("PYTHONFAULTHANDLER", "1"),
+    }
     # The matrices are small: threads of a linear algebra library cost here more than they give.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        environment.setdefault(variable, "1")
-    return environment
+        shared[variable] = before.get(variable, "1")
+    return shared
+
+
+def _environment() -> dict[str, str]:
+    own = {LAUNCHER_VARIABLE: str(os.getpid())}
+    return dict(os.environ) | shared_environment(os.environ) | own
 
 
 def _peak_bytes(pid: int) -> int:
