@@ -7,13 +7,14 @@ frame of each. Started by tieline, with the path of its HELICS file as argument.
 import json
 import struct
 import sys
+from pathlib import Path
 
 import helics
 
 NEAR, FAR = 119, 49  # buses: Alberta, southern California
 GAIN = 9.0
 
-config = json.load(open(sys.argv[1]))
+config = json.loads(Path(sys.argv[1]).read_text())
 told = config["tieline"]
 federate = helics.helicsCreateMessageFederateFromConfig(sys.argv[1])
 endpoint = helics.helicsFederateGetEndpoint(federate, config["endpoints"][0]["name"])

@@ -45,6 +45,8 @@ for command in (
     report.report,
     models.models,
     federation.export_helics,
+    federation.broker,
+    federation.join,
     federation.gather,
     linear.modes,
     linear.freqresp,

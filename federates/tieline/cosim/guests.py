@@ -33,8 +33,8 @@ class GuestSettings(BaseModel):
     command: str = Field(
         min_length=1,
         description=(
-            "program and arguments, run in the experiment's folder; {config} stands for the"
-            " federate's HELICS file, {name} {core} {broker} {port} {stop} {folder} for single facts"
+            "program and arguments, run in the experiment's folder; {config} stands for its HELICS"
+            " file, {name} {core} {broker} {port} {stop} {folder} for single facts"
         ),
     )
     units: tuple[str, ...] = Field(
@@ -61,7 +61,9 @@ def guest_problems(guests: Sequence[GuestSettings], core: str, members: Sequence
     """Return what does not fit together among the guests of a federation."""
     found = []
     if guests and core not in ("zmq", "tcp"):
-        found.append(f"guests need core zmq or tcp, as they are processes of their own (got {core})")
+        found.append(
+            f"guests need core zmq or tcp, as they are processes of their own (got {core})"
+        )
     taken = [*members, "broker", "together"]
     owners: dict[str, str] = {}
     for guest in guests:

@@ -94,7 +94,7 @@ def _federate(name: str, words: Any, directory: str) -> dict[str, Any]:
         "host": "localhost",
         "directory": directory,
         "exec": shlex.join([_program(words[0]), *words[1:]]),
-        "env": shared_environment(os.environ),
+        "env": {key: value for key, value in shared_environment({}).items() if key != "PATH"},
     }
 
 

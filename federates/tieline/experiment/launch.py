@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from tieline.cosim.conventions import member_count
-from tieline.cosim.interfaces import FEDERATES, GRID, NETWORK, FederationSettings
+from tieline.cosim.interfaces import FEDERATES, GRID, NETWORK
 from tieline.cosim.ports import reserved_port
 from tieline.cosim.runfile import federation_of
 from tieline.errors import CosimError, TielineError
 from tieline.experiment.guests import GuestProcess, guest_processes
+from tieline.experiment.remote import Remote
 from tieline.experiment.supervise import Child, ProcessUse, end_all
 from tieline.experiment.watch import Progress, Suspect, Watch
 
@@ -110,27 +111,43 @@ def launch(
             broker = [*table[BROKER], settings.core, str(port), members]
             starts = [(BROKER, broker), *((name, [*table[name], str(run_file)]) for name in order)]
         guests = guest_processes(run, folder)
-        return _Launch(folder, settings, on_progress, guests).run(starts, stagger_s)
+        return Processes(folder, Watch(settings), on_progress, guests).run(starts, stagger_s)
 
 
-class _Launch:
-    """The processes of one run and what is known of them."""
+class Processes:
+    """The processes of one run and what is known of them.
+
+    Args:
+        folder: the run folder.
+        watch: judges them.
+        on_progress: called with every word of a federate about itself.
+        guests: started once the federates are ready to join.
+        remotes: processes of other hosts.
+        on_fault: told who is at fault before everything is ended.
+        on_word: given every word as it came.
+    """
 
     def __init__(
         self,
         folder: Path,
-        settings: FederationSettings,
+        watch: Watch,
         on_progress: Callable[[Progress], None] | None,
         guests: Sequence[GuestProcess] = (),
+        *,
+        remotes: Sequence[Remote] = (),
+        on_fault: Callable[[Suspect], None] | None = None,
+        on_word: Callable[[Mapping[str, Any]], None] | None = None,
     ) -> None:
         self._folder = folder
         self._on_progress = on_progress
-        self._watch = Watch(settings)
+        self._watch = watch
         self._guests = list(guests)
-        self._children: dict[str, Child] = {}
+        self._on_fault = on_fault
+        self._on_word = on_word
+        self._children: dict[str, Child | Remote] = {remote.name: remote for remote in remotes}
         self._marks: dict[str, float] = {}
 
-    def run(self, starts: Sequence[tuple[str, list[str]]], stagger_s: float) -> Outcome:
+    def run(self, starts: Sequence[tuple[str, list[str]]], stagger_s: float = 0.0) -> Outcome:
         """Return the outcome once every process has ended well."""
         self._marks["start"] = time.monotonic()
         try:
@@ -192,6 +209,8 @@ class _Launch:
     def _hear(self) -> None:
         for child in self._children.values():
             for message in child.read():
+                if self._on_word is not None:
+                    self._on_word(message)
                 progress = self._watch.hear(message)
                 if progress is not None and self._on_progress is not None:
                     self._on_progress(progress)
@@ -210,6 +229,8 @@ class _Launch:
         self._fail(suspect)
 
     def _fail(self, suspect: Suspect) -> NoReturn:
+        if self._on_fault is not None:
+            self._on_fault(suspect)
         self._end()
         child = self._children.get(suspect.name, self._children.get(TOGETHER))
         tail = () if child is None else tuple(child.log.tail)

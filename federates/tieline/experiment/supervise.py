@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import tieline
 from tieline.cosim.process import LAUNCHER_VARIABLE
@@ -29,6 +29,22 @@ class ProcessUse:
     exit_code: int
     cpu_s: float
     peak_bytes: int
+
+
+class Process(Protocol):
+    """What ends and is heard: a child, or a process of another host."""
+
+    def poll(self) -> bool:
+        """Return whether it has ended."""
+
+    def read(self) -> Iterator[dict[str, Any]]:
+        """Yield what it says."""
+
+    def terminate(self) -> None:
+        """Ask it to save and end."""
+
+    def kill(self) -> None:
+        """End it."""
 
 
 class Log:
@@ -67,6 +83,7 @@ class Child:
 
     Attributes:
         exit_code: None while it runs; negative for the signal that killed it.
+        reason: always None; a process of another host may have one.
     """
 
     def __init__(
@@ -74,6 +91,7 @@ class Child:
     ) -> None:
         self.name = name
         self.exit_code: int | None = None
+        self.reason: str | None = None
         self.use: ProcessUse | None = None
         self._peak_bytes = 0
         self._process = subprocess.Popen(
@@ -181,7 +199,7 @@ class Child:
             yield from lines
 
 
-def end_all(children: Sequence[Child], grace_s: float) -> None:
+def end_all(children: Sequence[Process], grace_s: float) -> None:
     """End every child: each may save for `grace_s` after SIGTERM, then its group is killed."""
     limit = time.monotonic() + grace_s
     try:
@@ -195,7 +213,7 @@ def end_all(children: Sequence[Child], grace_s: float) -> None:
             child.kill()
 
 
-def drain(children: Sequence[Child]) -> None:
+def drain(children: Sequence[Process]) -> None:
     """Read what the children say, so that none waits for a full pipe; only logs keep it."""
     for child in children:
         for _ in child.read():

@@ -17,8 +17,8 @@ from tieline.grid.check import sensor_buses
 from tieline.grid.devices import with_pss
 from tieline.grid.events import plan_events
 from tieline.grid.load_mix import with_load_mix
-from tieline.grid.modulation import Modulation
 from tieline.grid.models.registry import use_file
+from tieline.grid.modulation import Modulation
 from tieline.grid.plan import HELD, Average
 from tieline.grid.powerflow import solve_power_flow
 from tieline.grid.recorder import Recorder
