@@ -109,7 +109,7 @@ def join(
         if federate not in FEDERATES:
             raise InputError(f"--federate must be grid or network (got {federate!r})")
         run = single_run(planned(reference, settings or []), "join")
-        join_run(run, federate, host, port, out, _seconds(wait), say)
+        join_run(run, federate, (host, port), out, _seconds(wait), say)
         say(f"the {federate} reached the end; its tables are in {out}")
 
 

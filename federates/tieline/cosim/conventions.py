@@ -42,7 +42,7 @@ def member_count(run: Mapping[str, Any]) -> int:
 def broker_options(place: Place, members: int) -> str:
     """Return how a broker for `members` federates is told where to listen."""
     where = "" if place.port is None else f" --port={place.port} --local_interface={place.host}"
-    return f"--federates={members}{where} {WATCHFUL}"
+    return f"--federates={members}{where}{_reuse(place)} {WATCHFUL}"
 
 
 def core_options(place: Place, connect_s: float) -> str:
@@ -53,7 +53,12 @@ def core_options(place: Place, connect_s: float) -> str:
     where = f"--brokeraddress={place.host} --brokerport={place.port}"
     # On loopback HELICS finds its own way, and is left the one that it was measured on.
     own = "" if place.interface == LOOPBACK else f" --local_interface={place.interface}"
-    return f"{options} {where}{own}"
+    return f"{options} {where}{own}{_reuse(place)}"
+
+
+def _reuse(place: Place) -> str:
+    # Else a tcp port stays taken for a minute after a run: Linux keeps ended connections so long.
+    return " --reuse_address" if place.core == "tcp" else ""
 
 
 def federate_config(

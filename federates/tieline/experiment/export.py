@@ -34,6 +34,16 @@ def single_run(plan: Plan, what: str) -> PlannedRun:
     return plan.runs[0]
 
 
+def check_empty(folder: Path) -> None:
+    """Refuse a folder that holds something.
+
+    Raises:
+        InputError: it does, or it is a file.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"--out {folder} is not empty: give a new or an empty folder")
+
+
 def lay_out(planned: PlannedRun, folder: Path, **federation: Any) -> dict[str, Any]:
     """Make a run's folder for federates that no launcher watches; return its run file's content.
 
@@ -45,8 +55,7 @@ def lay_out(planned: PlannedRun, folder: Path, **federation: Any) -> dict[str, A
     Raises:
         InputError: the folder holds something.
     """
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"--out {folder} is not empty: give a new or an empty folder")
+    check_empty(folder)
     folder.mkdir(parents=True, exist_ok=True)
     run = dict(planned.run) | {"leaves_word": True}
     run["federation"] = {**planned.run["federation"], **federation}

@@ -8,6 +8,7 @@ from typing import Any
 from tieline.cosim.interfaces import FEDERATES
 from tieline.cosim.word import read_word
 from tieline.errors import CosimError, InputError
+from tieline.experiment.export import check_empty
 from tieline.experiment.launch import Outcome
 from tieline.experiment.manifest import run_facts, save_manifest, write_json
 from tieline.experiment.results import SUMMARY, Run, read_manifest
@@ -39,8 +40,7 @@ def gather(folders: Sequence[Path], target: Path) -> Path:
     manifest = _one_run(folders)
     words = {name: _word(folders, name) for name in FEDERATES}
     _check_versions(words)
-    if target.exists() and (not target.is_dir() or any(target.iterdir())):
-        raise InputError(f"--out {target} is not empty: give a new or an empty folder")
+    check_empty(target)
     target.mkdir(parents=True, exist_ok=True)
     for folder in folders:
         _copy(folder, target)

@@ -3,15 +3,23 @@
 import select
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 from tieline.cosim.interfaces import FEDERATES, FederationSettings
 from tieline.cosim.runfile import federation_of
 from tieline.errors import CosimError, InputError
 from tieline.experiment.desk import Message, Wire, connect, hello, listen, refusal
-from tieline.experiment.export import lay_out
-from tieline.experiment.launch import BROKER, COMMANDS, FederateFailedError, Outcome, Processes
+from tieline.experiment.export import check_empty, lay_out
+from tieline.experiment.launch import (
+    BROKER,
+    COMMANDS,
+    FederateFailedError,
+    Outcome,
+    Processes,
+    termination_as_interrupt,
+)
 from tieline.experiment.plan import PlannedRun
 from tieline.experiment.remote import Remote, Uplink
 from tieline.experiment.watch import Progress, Suspect, Watch
@@ -20,8 +28,8 @@ Say = Callable[[str], None]
 
 _ANSWER_S = 5.0
 _OVER_S = 30.0
-_PATIENCE = 2.0
-"""How much longer a single federate waits than the broker, which knows better who hangs."""
+_PATIENCE = 20.0
+"""How much longer a single federate waits than the broker, which hears both and ends a run."""
 
 
 class RefusedError(InputError):
@@ -67,40 +75,45 @@ def serve(
         FederateFailedError: a federate or the broker died, failed or hung.
     """
     settings = _settings(planned)
-    wires = _admit(planned, host, port, wait_s, say)
-    remotes = [Remote(name, wires[name]) for name in FEDERATES]
-    place = [settings.core, str(port + 1), f"--host={host}"]
-    try:
-        with tempfile.TemporaryDirectory(prefix="tieline-broker-") as folder:
-            processes = Processes(
-                Path(folder),
-                Watch(settings),
-                on_progress,
-                remotes=remotes,
-                on_fault=lambda suspect: _tell_all(remotes, suspect),
-            )
-            for remote in remotes:
-                remote.tell({"go": port + 1})
-            outcome = processes.run([(BROKER, [*COMMANDS[BROKER], *place])])
-        for remote in remotes:
-            remote.tell({"over": True})
-        return outcome
-    finally:
+    with termination_as_interrupt(), ExitStack() as stack:
+        wires = _admit(planned, host, port, wait_s, say)
         for wire in wires.values():
-            wire.close()
+            stack.callback(wire.close)
+        remotes = [Remote(name, wires[name]) for name in FEDERATES]
+        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tieline-broker-"))
+        processes = Processes(
+            Path(folder),
+            Watch(settings),
+            on_progress,
+            remotes=remotes,
+            on_fault=lambda at_fault: _tell_all(remotes, {"end": _sentence(at_fault)}),
+        )
+        _tell_all(remotes, {"go": port + 1})
+        place = [settings.core, str(port + 1), f"--host={host}"]
+        outcome = processes.run([(BROKER, [*COMMANDS[BROKER], *place])])
+        _tell_all(remotes, {"over": True})
+        return outcome
 
 
 def join(
     planned: PlannedRun,
     federate: str,
-    host: str,
-    port: int,
+    broker: tuple[str, int],
     folder: Path,
     wait_s: float,
     say: Say,
-    on_progress: Callable[[Progress], None] | None = None,
+    commands: Mapping[str, Sequence[str]] = COMMANDS,
 ) -> Outcome:
-    """Run one federate of a run whose broker is elsewhere; its tables go to `folder`.
+    """Run one federate of a run whose broker is elsewhere, and return how it went.
+
+    Args:
+        planned: the run, the same as at the broker.
+        federate: `grid` or `network`.
+        broker: its address and port.
+        folder: where the tables go; new or empty.
+        wait_s: longest wait for the broker and for the others.
+        say: is told what is waited for.
+        commands: what starts a federate.
 
     Raises:
         InputError: the folder is not empty.
@@ -109,35 +122,33 @@ def join(
         FederateFailedError: this federate, the broker or another one failed.
     """
     settings = _settings(planned)
-    wire = connect(host, port, wait_s)
-    try:
-        broker_port = _knock(wire, planned, federate, wait_s, say)
-        lay_out(
-            planned,
-            folder,
-            broker_host=wire.other_address,
-            broker_port=broker_port,
-            interface=wire.own_address,
-        )
+    check_empty(folder)
+    with termination_as_interrupt(), closing(connect(*broker, wait_s)) as wire:
+        port = _knock(wire, planned, federate, wait_s, say)
+        place = {"broker_host": wire.other_address, "interface": wire.own_address}
+        lay_out(planned, folder, broker_port=port, **place)
         uplink = Uplink(wire)
-        patient = settings.model_copy(update={"hang_timeout": _PATIENCE * settings.hang_timeout})
         processes = Processes(
             folder,
-            Watch(patient, members=(federate,), bystanders=(BROKER,)),
-            on_progress,
+            Watch(_patient(settings), members=(federate,), bystanders=(BROKER,)),
+            None,
             remotes=[uplink],
             on_word=uplink.hear,
         )
-        command = [*COMMANDS[federate], str(folder / "run.json")]
         try:
-            outcome = processes.run([(federate, command)])
+            outcome = processes.run([(federate, [*commands[federate], str(folder / "run.json")])])
         except FederateFailedError as error:
             uplink.tell({"done": error.exit_code, "reason": error.reason})
             raise
-        _leave(wire, outcome)
+        _leave(wire)
         return outcome
-    finally:
-        wire.close()
+
+
+def _patient(settings: FederationSettings) -> FederationSettings:
+    longer = {
+        name: _PATIENCE * getattr(settings, name) for name in ("hang_timeout", "start_timeout")
+    }
+    return settings.model_copy(update=longer)
 
 
 def _settings(planned: PlannedRun) -> FederationSettings:
@@ -216,14 +227,18 @@ def _knock(wire: Wire, planned: PlannedRun, federate: str, wait_s: float, say: S
     return int(answer["go"])
 
 
-def _tell_all(remotes: list[Remote], suspect: Suspect) -> None:
+def _tell_all(remotes: Sequence[Remote], message: Message) -> None:
     for remote in remotes:
-        remote.tell({"end": f"{suspect.name}: {suspect.reason}"})
+        remote.tell(message)
 
 
-def _leave(wire: Wire, outcome: Outcome) -> None:
+def _sentence(suspect: Suspect) -> str:
+    return f"{suspect.name}: {suspect.reason}"
+
+
+def _leave(wire: Wire) -> None:
     """Tell the broker that all went well here, and wait until it did everywhere."""
     wire.send({"done": 0})
-    answer: Message = wire.wait(_OVER_S)
+    answer = wire.wait(_OVER_S)
     if "over" not in answer:
         raise CosimError(f"the run did not end well elsewhere: {answer.get('end', answer)}")

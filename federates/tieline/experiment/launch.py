@@ -101,7 +101,7 @@ def launch(
     settings, _ = federation_of(run)
     table = {**COMMANDS, **(commands or {})}
     with ExitStack() as stack:
-        stack.enter_context(_termination_as_interrupt())
+        stack.enter_context(termination_as_interrupt())
         if settings.core in ("inproc", "local"):
             starts = [(TOGETHER, [*table[TOGETHER], str(run_file)])]
         else:
@@ -273,7 +273,7 @@ def _write_port(run_file: Path, run: dict[str, Any], port: int) -> None:
 
 
 @contextmanager
-def _termination_as_interrupt() -> Iterator[None]:
+def termination_as_interrupt() -> Iterator[None]:
     """Have SIGTERM end a run as Ctrl-C does; left alone outside the main thread or if handled."""
     if (
         threading.current_thread() is not threading.main_thread()

@@ -94,7 +94,7 @@ class Uplink(Remote):
 
     def take(self, message: Mapping[str, Any]) -> None:
         """Take in that the run ends, well or badly."""
-        if "end" in message:
+        if "end" in message and self.exit_code == 0:
             self.exit_code, self.reason = CosimError.exit_code, str(message["end"])
 
     def poll(self) -> bool:
