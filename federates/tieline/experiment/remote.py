@@ -32,6 +32,7 @@ class Remote:
         self.reason: str | None = None
         self.use = None
         self.log = _Tail()
+        self._has_finished = False
         self._wire = wire
 
     @property
@@ -43,6 +44,7 @@ class Remote:
         """Yield what the federate says of itself."""
         for message in self._wire.read():
             if "federate" in message:
+                self._has_finished = message.get("state") == "finished"
                 yield message
             elif message:
                 self.take(message)
@@ -69,13 +71,15 @@ class Remote:
         self._wire.send(message)
 
     def terminate(self) -> None:
-        """Have it end; it saves what it has."""
-        if not self.poll():
+        """Have it end; it saves what it has. One that has finished is about to end by itself."""
+        if not self.poll() and not self._has_finished:
             self.tell({"end": f"broker: {INTERRUPTED}"})
 
     def kill(self) -> None:
-        """Give it up."""
-        if self.exit_code is None:
+        """Give it up; one that has finished has written all that it had to."""
+        if self.exit_code is None and self._has_finished:
+            self.exit_code = 0
+        elif self.exit_code is None:
             self.exit_code, self.reason = CosimError.exit_code, "it did not end in time"
 
     def close(self) -> None:
