@@ -15,7 +15,6 @@ from tieline.experiment.export import check_empty, lay_out
 from tieline.experiment.launch import (
     BROKER,
     COMMANDS,
-    FederateFailedError,
     Outcome,
     Processes,
     termination_as_interrupt,
@@ -133,13 +132,10 @@ def join(
             Watch(_patient(settings), members=(federate,), bystanders=(BROKER,)),
             None,
             remotes=[uplink],
+            on_fault=uplink.end,
             on_word=uplink.hear,
         )
-        try:
-            outcome = processes.run([(federate, [*commands[federate], str(folder / "run.json")])])
-        except FederateFailedError as error:
-            uplink.tell({"done": error.exit_code, "reason": error.reason})
-            raise
+        outcome = processes.run([(federate, [*commands[federate], str(folder / "run.json")])])
         _leave(wire)
         return outcome
 
@@ -233,7 +229,8 @@ def _tell_all(remotes: Sequence[Remote], message: Message) -> None:
 
 
 def _sentence(suspect: Suspect) -> str:
-    return f"{suspect.name}: {suspect.reason}"
+    # Whoever hears it from the broker shows its name in front.
+    return suspect.reason if suspect.name == BROKER else f"{suspect.name}: {suspect.reason}"
 
 
 def _leave(wire: Wire) -> None:

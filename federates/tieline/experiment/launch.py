@@ -123,7 +123,7 @@ class Processes:
         on_progress: called with every word of a federate about itself.
         guests: started once the federates are ready to join.
         remotes: processes of other hosts.
-        on_fault: told who is at fault before everything is ended.
+        on_fault: told who is at fault, or that the user is, before everything is ended.
         on_word: given every word as it came.
     """
 
@@ -154,6 +154,8 @@ class Processes:
             self._start(starts, stagger_s)
             self._follow()
         except BaseException as error:
+            if isinstance(error, KeyboardInterrupt) and self._on_fault is not None:
+                self._on_fault(Suspect(starts[0][0], "interrupted", CosimError.exit_code))
             self._end()
             self._salvage(error)
             raise

@@ -7,6 +7,7 @@ from typing import Any
 from tieline.cosim.interfaces import FEDERATES
 from tieline.errors import CosimError
 from tieline.experiment.desk import Wire
+from tieline.experiment.watch import Suspect
 
 INTERRUPTED = "it was interrupted there"
 
@@ -107,6 +108,10 @@ class Uplink(Remote):
         if self.exit_code == 0 and self._wire.lost:
             self.exit_code, self.reason = CosimError.exit_code, f"gone: {self._wire.lost}"
         return True
+
+    def end(self, suspect: Suspect) -> None:
+        """Tell that the federate here ends early, and why."""
+        self.tell({"done": suspect.exit_code, "reason": suspect.reason})
 
     def hear(self, message: Mapping[str, Any]) -> None:
         """Pass on what the federate here says of itself."""
