@@ -24,7 +24,7 @@ DELAY_MS = 5.0
 PORT = "23404"
 REASON = why_not()
 
-pytestmark = [pytest.mark.helics, pytest.mark.netns]
+pytestmark = [pytest.mark.helics, pytest.mark.netns, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")

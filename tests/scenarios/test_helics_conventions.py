@@ -79,6 +79,7 @@ def test_a_guest_gets_the_c37118_bytes_of_each_packet_at_its_arrival(guided: Run
 
 
 @pytest.mark.helics
+@pytest.mark.slow
 def test_helicss_own_runner_gives_the_same_bits(guided: Run, tmp_path: Path) -> None:
     """Else a federation that HELICS's users start themselves would be another experiment."""
     folder = tmp_path / "helics"
