@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat
 
 from tieline.errors import CosimError
-from tieline.units import NS_PER_S
+from tieline.units import NS_PER_S, Unit
 
 MODULATION = "grid/modulation"
 """Endpoint of the grid that takes stabiliser signals."""
@@ -40,8 +40,11 @@ class GuestSettings(BaseModel):
     units: tuple[str, ...] = Field(
         (), description="units whose controllers' packets it gets and whose stabilisers it may move"
     )
-    limit: StrictFloat = Field(
-        0.1, gt=0, description="largest stabiliser signal either way; beyond it is clipped, pu"
+    limit: Annotated[StrictFloat, Unit("pu")] = Field(
+        0.1,
+        gt=0,
+        le=10,
+        description="largest stabiliser signal either way; beyond it is clipped, pu",
     )
 
     def words(self, facts: Mapping[str, object]) -> list[str]:
