@@ -20,11 +20,19 @@ from tieline.resources import case_folder, shipped
 
 @dataclass(frozen=True)
 class PlannedRun:
-    """One run: its point, the content of its run file, and hashes of the files that it reads."""
+    """One run.
+
+    Attributes:
+        point: its settings.
+        run: the content of its run file.
+        inputs: hashes of the files that it reads.
+        interconnection: what a drawing of it needs, or None.
+    """
 
     point: Point
     run: Mapping[str, Any]
     inputs: Mapping[str, str]
+    interconnection: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -88,7 +96,7 @@ def _planned(study: Study, point: Point, survey: Survey, known: dict[str, Sites]
         inputs["trace"] = hashlib.sha256(trace.read_bytes()).hexdigest()
     run = _run_file(point, sites, folder, topology) | {"grid": parts["grid"]}
     run["network"]["empirical"] = parts["network"]["empirical"]
-    return PlannedRun(point, run, inputs)
+    return PlannedRun(point, run, inputs, sites.interconnection)
 
 
 def _run_file(point: Point, sites: Sites, folder: Path, topology: Path | None) -> dict[str, Any]:

@@ -24,6 +24,7 @@ class Sites:
         plot_unit: the unit whose voltage is drawn, or None.
         lookahead_ns: least time from a measurement until its frame does anything; None without
             frames.
+        interconnection: what a drawing of it needs, as `interconnection` returns it, or None.
     """
 
     sensors: tuple[int, ...]
@@ -32,6 +33,7 @@ class Sites:
     tie_mode: Mapping[str, Any] | None = None
     plot_unit: str | None = None
     lookahead_ns: int | None = 0
+    interconnection: Mapping[str, Any] | None = None
 
     def sources(self) -> list[dict[str, Any]]:
         """Return the PMUs as the run file lists them."""
@@ -65,6 +67,8 @@ def survey(experiment: Experiment, folder: Path, topology: Path | None) -> Sites
             flow diverges, or the network does not connect what it must.
     """
     # The case brings the compiled models with it, which `tieline list` should not wait for.
+    from tieline.experiment.interconnection import interconnection
+    from tieline.experiment.power_grid import power_grid_of
     from tieline.grid.case import load_case
     from tieline.grid.models.registry import use_file
     from tieline.network.topology import network_spec
@@ -80,7 +84,7 @@ def survey(experiment: Experiment, folder: Path, topology: Path | None) -> Sites
         None if tie_mode is None else tie_mode.model_dump(mode="json"),
         case.base.plot_unit,
     )
-    lookahead_ns = None
+    lookahead_ns, spec = None, None
     if sensors and controllers:
         sources, destinations = sites.sources(), sites.destinations()
         try:
@@ -91,7 +95,13 @@ def survey(experiment: Experiment, folder: Path, topology: Path | None) -> Sites
     if findings:
         raise InputError(findings)
     has_frames = experiment.wams.reporting != "continuous"
-    return replace(sites, lookahead_ns=lookahead_ns if has_frames else None)
+    buses = case.buses.number[case.unit_bus].tolist()
+    drawn = interconnection(
+        power_grid_of(case),
+        list(zip(case.units, buses, strict=True)),
+        None if topology is None else spec,
+    )
+    return replace(sites, lookahead_ns=lookahead_ns if has_frames else None, interconnection=drawn)
 
 
 def _stations(

@@ -22,7 +22,7 @@ def draw(folder: Path, plots: Path | None = None) -> list[Path]:
 
     Args:
         folder: the run's, with `controller_series.parquet` and `link_series.parquet`.
-        plots: where the PNG files go instead; made if missing.
+        plots: where the files go instead; made if missing.
 
     Raises:
         InputError: the run has no series.

@@ -8,7 +8,7 @@ import pytest
 
 from network.test_series import recorded
 from tieline.errors import InputError
-from tieline.network.plots import busiest_links, controller_ages, controller_delays, draw
+from tieline.report.network_figures import busiest_links, controller_ages, controller_delays, draw
 
 
 def test_a_run_with_series_gets_its_figures(tmp_path: Path) -> None:
