@@ -167,11 +167,12 @@ def _laid_out(facts: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     graph: nx.Graph[str] = nx.Graph()
     graph.add_nodes_from(names)
     for a, b, km in lengths:
-        graph.add_edge(a, b, km=min(km, graph.get_edge_data(a, b, {"km": km})["km"]))
+        known = graph.get_edge_data(a, b, {"km": km})
+        graph.add_edge(a, b, km=min(km, known["km"]))
     parts = [min(part) for part in nx.connected_components(graph)]
     graph.add_edges_from(((parts[0], other) for other in parts[1:]), km=APART_KM)
     # Stations next to each other must not cover each other for the sake of a long line elsewhere.
-    corridors = [Corridor(a, b, km**0.5) for a, b, km in graph.edges(data="km")]
+    corridors = [Corridor(a, b, float(d["km"]) ** 0.5) for a, b, d in graph.edges(data=True)]
     first = [s["name"] for s in facts["stations"] if s["area"] == next(iter(facts["areas"]), None)]
     xy = _turned(layout(names, corridors, first if len(facts["areas"]) > 2 else ()), facts, names)
     return {

@@ -1,0 +1,82 @@
+"""Writes the page of one run."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from tieline.experiment.results import Run
+from tieline.report import facts
+from tieline.report.drawing import drawing
+from tieline.report.grid_curves import put_grid
+from tieline.report.html import Html, element
+from tieline.report.page import PAGE, note, placeholder, write_page
+from tieline.report.store import Chart, Store
+from tieline.report.traffic_curves import put_traffic
+
+OF_THE_GRID = ("speed", "pmu", "vt", "wbar", "error", "vs", "age")
+ROUNDING = (
+    "Drag over a chart to zoom in on time in all charts, double-click to see everything again."
+    " Curves are rounded to 1/65,000 of their own range; the tables beside this page are exact."
+)
+
+
+def write_run_page(run: Run, sweep: str | None = None) -> Path:
+    """Write `report.html` into a run's folder, and return its path.
+
+    Args:
+        run: complete, or as far as it came; without a grid the page has no curves.
+        sweep: the page of the sweep that it is a point of, as seen from its folder.
+    """
+    store = Store()
+    drawn = None
+    if run.columns("grid") and len(run.table("grid", "t_s")):
+        put_grid(store, run)
+        put_traffic(store, run)
+        drawn = drawing(store, run)
+    summary = run.summary() if run.is_complete else {}
+    data = store.data() | {
+        "drawing": drawn,
+        "events": run.events(),
+        "focus": _focus(run),
+        "begin_s": summary.get("frequency", {}).get("nadir_s", 0.0),
+    }
+    up = element("p", element("a", "All points of this sweep", href=sweep)) if sweep else ""
+    top = Html(facts.head(run.manifest, run.manifest["label"]) + up)
+    sections = [("top", "", top), ("asked", "What was asked", facts.asked(run))]
+    if run.is_complete:
+        sections.append(("answer", "The answer", facts.answer(run)))
+    if drawn is not None:
+        sections.append(("replay", "Replay", _replay(drawn["places"])))
+    grid = [chart for chart in store.charts if chart.name in OF_THE_GRID]
+    network = [chart for chart in store.charts if chart.name not in OF_THE_GRID]
+    if grid:
+        sections.append(("curves", "Grid and controllers", _charts(grid, note(ROUNDING))))
+    tables = facts.links_table(run.table("links")) + facts.controllers_table(
+        run.table("flows"), run.table("ages")
+    )
+    sections.append(("network", "Network", _charts(network, Html(tables))))
+    files = sorted(path.name for path in run.folder.glob("*.parquet"))
+    texts = ("manifest.json", "run.json", "map.json", "table.csv")
+    named = [name for name in texts if (run.folder / name).is_file()]
+    made = Html(facts.provenance(run.manifest, [*named, *files]) + facts.figures(run.folder))
+    sections.append(("files", "Provenance", made))
+    return write_page(run.folder / PAGE, f"{run.manifest['name']}: {run.label}", sections, data)
+
+
+def _focus(run: Run) -> str | None:
+    """Return the unit that stands out at first: the one that the case would have drawn."""
+    chosen = run.told().get("plot_unit")
+    return str(chosen) if chosen and chosen not in run.tripped_units() else None
+
+
+def _replay(places: str) -> Html:
+    said = (
+        "The lines are transmission corridors; beside each, the link in either direction,"
+        " keeping right. A station's colour is its frequency (PMU, or else a rotor there), a"
+        " square is a unit with the age of its controller's data."
+        f" Places: {places}; they are no geography."
+    )
+    return Html(placeholder("drawing", "run") + note(said))
+
+
+def _charts(charts: Sequence[Chart], first: Html) -> Html:
+    return Html(first + "".join(placeholder("chart", chart.name) for chart in charts))
