@@ -27,16 +27,15 @@ NAMES = {
 MOST_LINKS = 20
 
 
-def head(manifest: Mapping[str, Any], label: str | None) -> Html:
+def head(manifest: Mapping[str, Any], label: str | None, seed: str) -> Html:
     """Return the top of a page: name, question, and what identifies the result."""
     status = str(manifest["status"])
-    seed = manifest.get("seed")
     items: list[tuple[object, object]] = [
         ("result", element("span", status, class_=f"status {status}")),
         ("tieline", manifest["versions"]["tieline"]),
         ("config hash", element("code", manifest["config_hash"][:16])),
     ]
-    items += [] if seed is None else [("seed", seed)]
+    items += [("seed", seed)] if seed else []
     items += [("run", element("code", manifest["run_id"]))] if "run_id" in manifest else []
     name = manifest["name"] if not label else f"{manifest['name']}: {label}"
     reason = manifest.get("reason")
@@ -75,30 +74,52 @@ def asked(run: Run) -> Html:
     )
 
 
+def points(runs: Sequence[Run]) -> Html:
+    """Return what the points of a sweep differ in: a row each."""
+    settings = [dict(_flat(run.config)) for run in runs]
+    keys = list(dict.fromkeys(key for setting in settings for key in setting))
+    missing = "-"
+    differ = [key for key in keys if len({s.get(key, missing) for s in settings}) > 1]
+    rows = [
+        (run.label, *(setting.get(key, missing) for key in differ))
+        for run, setting in zip(runs, settings, strict=True)
+    ]
+    said = element("p", f"{len(runs)} points, which differ in {len(differ)} settings:")
+    return Html(said + table(("point", *differ), rows, "Settings that differ", numbers_from=99))
+
+
 def answer(run: Run) -> Html:
     """Return the answer of one run: its numbers, and what could not be told."""
     summary = run.summary()
-    rows = [(NAMES.get(f.name, f.name), *_with_unit(summary, f)) for f in FIELDS]
+    rows: dict[str, list[tuple[str, str, str]]] = {f.path[0]: [] for f in FIELDS}
+    for f in FIELDS:
+        rows[f.path[0]].append((NAMES.get(f.name, f.name), *_with_unit(summary, f)))
+    of_the_grid = rows["frequency"] + rows["swing"]
     lowest = summary.get("lowest_voltage")
     if lowest:
         said = f"pu, unit {lowest['unit']} at {lowest['t_s']:.1f} s"
-        rows.append(("Lowest terminal voltage", f"{lowest['vt_pu']:.3f}", said))
+        of_the_grid.append(("Lowest terminal voltage", f"{lowest['vt_pu']:.3f}", said))
+    of_the_network = rows["delay"]
     age = summary.get("age", {}).get("mean_s")
     if age is not None:
-        rows.append(("Mean age of the data acted on", f"{1e3 * age:.1f}", "ms"))
-    rows += _packets(summary.get("packets", {}))
+        of_the_network.append(("Mean age of the data acted on", f"{1e3 * age:.1f}", "ms"))
+    of_the_network += rows["packets"] + _packets(summary.get("packets", {}))
     remarks = [summary.get("ending"), _no_swing(summary)]
     happened = [(f"{at_s:.3f}", what) for at_s, what in run.events()]
+    tables = (
+        _table_of_three("Grid", of_the_grid),
+        _table_of_three("Network", of_the_network),
+        table(("time, s", "what happened"), happened, "Events", 9) if happened else "",
+    )
     return Html(
-        _table_of_three(rows)
+        element("div", *tables, class_="answers")
         + "".join(element("p", remark, class_="warning") for remark in remarks if remark)
-        + (table(("time, s", "what happened"), happened, "Events", 9) if happened else "")
     )
 
 
 def comparison(runs: Sequence[Run], pages: Sequence[str | None]) -> Html:
     """Return the table of a sweep's points, each with a link to its own page, if it has one."""
-    heads = ["run", *(field.heading.replace("\n", ", ") for field in FIELDS)]
+    heads = ["run", *(_heading(field) for field in FIELDS)]
     rows = []
     for run, page in zip(runs, pages, strict=True):
         name = element("a", run.label, href=page) if page else run.label
@@ -195,7 +216,7 @@ def figures(folder: Path) -> Html:
 
 def _listed(files: Iterable[str]) -> Iterator[Html]:
     for i, name in enumerate(files):
-        yield Html(", " if i else "Beside this page: ") + element("a", name, href=name)  # type: ignore[misc]
+        yield Html((", " if i else "Beside this page: ") + element("a", name, href=name))
 
 
 def _with_unit(summary: Summary, field: Any) -> tuple[str, str]:
@@ -203,7 +224,11 @@ def _with_unit(summary: Summary, field: Any) -> tuple[str, str]:
     return shown(summary, field), "" if unit == "ratio" else unit
 
 
-def _table_of_three(rows: Sequence[tuple[str, str, str]]) -> Html:
+def _heading(field: Any) -> str:
+    return str(field.heading).replace("\n", ", ").replace("damp.,", "damping")
+
+
+def _table_of_three(caption: str, rows: Sequence[tuple[str, str, str]]) -> Html:
     body = [
         element(
             "tr",
@@ -213,8 +238,7 @@ def _table_of_three(rows: Sequence[tuple[str, str, str]]) -> Html:
         )
         for name, value, unit in rows
     ]
-    caption = element("caption", "What came out")
-    return element("table", caption, element("tbody", *body), class_="answer")
+    return element("table", element("caption", caption), element("tbody", *body))
 
 
 def _packets(packets: Mapping[str, int]) -> list[tuple[str, str, str]]:

@@ -31,6 +31,7 @@ def put_grid(store: Store, run: Run) -> None:
     reference = Curve(COI, "coi", 0, COI, style="reference")
     gone = ", ".join(sorted(run.tripped_units()))
     hidden = LATER.format(gone) if gone else ""
+    store.charts.append(Chart("coi", "System frequency", "Hz", [Curve(COI, "coi", 0, COI)]))
     _chart(store, "speed", "Rotor speeds", "frequency, Hz", put.curves, (reference,), hidden)
     _chart(store, "pmu", "Frequency at the PMUs", "frequency, Hz", put.curves, (reference,))
     _chart(store, "vt", "Terminal voltages", "voltage, pu", put.curves, note=hidden)
@@ -93,8 +94,7 @@ class _Putter:
     def _group(self, element: str) -> str:
         if element in self._tripped:
             return f"{element} (tripped)"
-        area = self._areas.get(element)
-        return f"area {area}" if area and area.isdigit() else area or UNITS
+        return self._areas.get(element) or UNITS
 
 
 def _chart(

@@ -39,6 +39,12 @@ def draw(folder: Path, plots: Path | None = None) -> list[Path]:
         return save(folder / "plots" if plots is None else plots, figures)
 
 
+def has_series(folder: Path) -> bool:
+    """Return whether a run's folder holds the series that `draw` needs."""
+    names = ("controller_series", "link_series")
+    return all((folder / f"{name}.parquet").is_file() for name in names)
+
+
 def controller_delays(series: pd.DataFrame) -> Figure:
     """Return a figure of the delays of the slowest, the middle and the fastest controller.
 

@@ -9,7 +9,7 @@ from tieline.report.html import Html, data_block, element, text
 ASSETS = Path(__file__).with_name("assets")
 LIBRARY = Path(__file__).with_name("vendor") / "uplot"
 
-SCRIPTS = ("unpack.js", "look.js", "charts.js", "drawing.js", "replay.js", "main.js")
+SCRIPTS = ("unpack.js", "look.js", "charts.js", "zoom.js", "drawing.js", "replay.js", "main.js")
 """In the order in which they build on each other."""
 
 PAGE = "report.html"
@@ -67,6 +67,11 @@ def write_page(
 def placeholder(kind: str, name: str) -> Html:
     """Return the place that a script fills: a `chart`, or the `drawing`."""
     return element("div", class_=kind, id=f"{kind}-{name}", data_name=name)
+
+
+def charts(names: Sequence[str]) -> Html:
+    """Return places for charts, two beside each other where the page is wide enough."""
+    return element("div", *(placeholder("chart", name) for name in names), class_="charts")
 
 
 def note(words: object) -> Html:

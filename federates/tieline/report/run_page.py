@@ -1,6 +1,5 @@
 """Writes the page of one run."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from tieline.experiment.results import Run
@@ -8,11 +7,12 @@ from tieline.report import facts
 from tieline.report.drawing import drawing
 from tieline.report.grid_curves import put_grid
 from tieline.report.html import Html, element
-from tieline.report.page import PAGE, note, placeholder, write_page
-from tieline.report.store import Chart, Store
+from tieline.report.page import PAGE, charts, note, placeholder, write_page
+from tieline.report.store import Store, area_name
 from tieline.report.traffic_curves import put_traffic
 
 OF_THE_GRID = ("speed", "pmu", "vt", "wbar", "error", "vs", "age")
+OF_THE_NETWORK = ("delay", "histogram", "reached", "load", "queue", "dropped_so_far")
 ROUNDING = (
     "Drag over a chart to zoom in on time in all charts, double-click to see everything again."
     " Curves are rounded to 1/65,000 of their own range; the tables beside this page are exact."
@@ -35,31 +35,50 @@ def write_run_page(run: Run, sweep: str | None = None) -> Path:
     summary = run.summary() if run.is_complete else {}
     data = store.data() | {
         "drawing": drawn,
-        "events": run.events(),
+        "areas": _areas(run),
+        "events": _events(run),
         "focus": _focus(run),
         "begin_s": summary.get("frequency", {}).get("nadir_s", 0.0),
     }
     up = element("p", element("a", "All points of this sweep", href=sweep)) if sweep else ""
-    top = Html(facts.head(run.manifest, run.manifest["label"]) + up)
+    top = Html(facts.head(run.manifest, run.manifest["label"], str(run.manifest["seed"])) + up)
     sections = [("top", "", top), ("asked", "What was asked", facts.asked(run))]
     if run.is_complete:
         sections.append(("answer", "The answer", facts.answer(run)))
     if drawn is not None:
         sections.append(("replay", "Replay", _replay(drawn["places"])))
     grid = [chart for chart in store.charts if chart.name in OF_THE_GRID]
-    network = [chart for chart in store.charts if chart.name not in OF_THE_GRID]
+    network = [chart for chart in store.charts if chart.name in OF_THE_NETWORK]
     if grid:
-        sections.append(("curves", "Grid and controllers", _charts(grid, note(ROUNDING))))
+        drawn_there = charts([chart.name for chart in grid])
+        sections.append(("curves", "Grid and controllers", Html(note(ROUNDING) + drawn_there)))
     tables = facts.links_table(run.table("links")) + facts.controllers_table(
         run.table("flows"), run.table("ages")
     )
-    sections.append(("network", "Network", _charts(network, Html(tables))))
+    drawn_there = charts([chart.name for chart in network])
+    sections.append(("network", "Network", Html(drawn_there + tables)))
     files = sorted(path.name for path in run.folder.glob("*.parquet"))
     texts = ("manifest.json", "run.json", "map.json", "table.csv")
     named = [name for name in texts if (run.folder / name).is_file()]
     made = Html(facts.provenance(run.manifest, [*named, *files]) + facts.figures(run.folder))
     sections.append(("files", "Provenance", made))
     return write_page(run.folder / PAGE, f"{run.manifest['name']}: {run.label}", sections, data)
+
+
+def _events(run: Run) -> list[tuple[float, str]]:
+    """Return what happened to the grid, and which links went down and up, in order of time."""
+    interconnection = run.map() or {"outages": (), "links": ()}
+    changes = []
+    for outage in interconnection["outages"]:
+        link = interconnection["links"][outage["link"]]
+        how = "down" if outage["is_down"] else "up"
+        changes.append((float(outage["t_s"]), f"{link['a']}-{link['b']} {how}"))
+    return sorted([*run.events(), *changes])
+
+
+def _areas(run: Run) -> list[str]:
+    interconnection = run.map()
+    return [] if interconnection is None else [area_name(a) for a in interconnection["areas"]]
 
 
 def _focus(run: Run) -> str | None:
@@ -76,7 +95,3 @@ def _replay(places: str) -> Html:
         f" Places: {places}; they are no geography."
     )
     return Html(placeholder("drawing", "run") + note(said))
-
-
-def _charts(charts: Sequence[Chart], first: Html) -> Html:
-    return Html(first + "".join(placeholder("chart", chart.name) for chart in charts))

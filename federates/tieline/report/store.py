@@ -102,14 +102,19 @@ def rows_of(table: pd.DataFrame, quantity: str, elements: Sequence[str]) -> Floa
     return np.ascontiguousarray(table[names].to_numpy(dtype=np.float64).T)
 
 
+def area_name(area: str) -> str:
+    """Return an area as the legend calls it; some cases have but a number for one."""
+    return f"area {area}" if area.isdigit() else area
+
+
 def areas_of(interconnection: Mapping[str, Any] | None) -> tuple[dict[str, str], dict[str, str]]:
     """Return the area of each unit, and of each bus as `B61`; nothing without a map."""
     if interconnection is None:
         return {}, {}
-    area = {station["name"]: station["area"] for station in interconnection["stations"]}
+    area = {s["name"]: area_name(s["area"]) for s in interconnection["stations"]}
     units = {unit["name"]: area[unit["station"]] for unit in interconnection["units"]}
     buses = {
-        f"B{bus}": station["area"]
+        f"B{bus}": area[station["name"]]
         for station in interconnection["stations"]
         for bus in station["buses"]
     }

@@ -9,8 +9,8 @@ import pandas as pd
 
 from tieline.experiment.results import POINTS, Run
 from tieline.report import facts
-from tieline.report.html import Html, details, element
-from tieline.report.page import PAGE, note, placeholder, write_page
+from tieline.report.html import Html, details
+from tieline.report.page import PAGE, charts, note, write_page
 from tieline.report.run_page import ROUNDING
 from tieline.report.store import Chart, Curve, Floats, Store, columns_of
 
@@ -38,6 +38,7 @@ def write_sweep_page(
     pages = [_page_of(run) for run in runs]
     data = store.data() | {
         "drawing": None,
+        "areas": [],
         "events": complete[0].events() if complete else [],
         "focus": None,
         "begin_s": 0.0,
@@ -45,15 +46,15 @@ def write_sweep_page(
     missing = len(runs) - sum(page is not None for page in pages)
     said = f"{missing} points have no page: `tieline report` of a point's folder writes it."
     answer = Html(facts.comparison(runs, pages) + (note(said) if missing else ""))
-    charts = "".join(placeholder("chart", chart.name) for chart in store.charts)
+    drawn = charts([chart.name for chart in store.charts])
     sections = [
-        ("top", "", facts.head(manifest, None)),
+        ("top", "", facts.head(manifest, None, _seeds(runs))),
         ("answer", "The answer", answer),
-        ("curves", "Points against each other", Html(note(ROUNDING) + charts)),
+        ("curves", "Points against each other", Html(note(ROUNDING) + drawn)),
     ]
     if complete:
-        asked = details("Settings of the first point", facts.asked(complete[0]))
-        sections.insert(1, ("asked", "What was asked", Html(_points(runs) + asked)))
+        asked = details(f"Settings of '{complete[0].label}'", facts.asked(complete[0]))
+        sections.insert(1, ("asked", "What was asked", Html(facts.points(runs) + asked)))
     texts = ("manifest.json", "summary.json", "table.csv")
     named = [name for name in texts if (folder / name).is_file()]
     made = Html(facts.provenance(manifest, named) + facts.figures(folder))
@@ -66,10 +67,9 @@ def _page_of(run: Run) -> str | None:
     return f"{POINTS}/{run.folder.name}/{PAGE}" if is_there else None
 
 
-def _points(runs: Sequence[Run]) -> Html:
-    """Return what the points are."""
-    names = ", ".join(run.label for run in runs)
-    return element("p", f"{len(runs)} points: {names}.")
+def _seeds(runs: Sequence[Run]) -> str:
+    seeds = sorted({int(run.manifest["seed"]) for run in runs})
+    return f"{seeds[0]} to {seeds[-1]}" if len(seeds) > 1 else "".join(map(str, seeds))
 
 
 def _put_over_time(store: Store, runs: Sequence[Run], unit: str | None) -> None:

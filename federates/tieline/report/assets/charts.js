@@ -5,18 +5,24 @@
   const { look } = tieline;
   const shown = new Map();
   const state = { focus: tieline.data.focus, time: null, zoom: null };
-  const HEIGHT = 280;
+  const HEIGHTS = { usual: 270, small: 150 };
 
   function groupsOf(spec) {
-    const names = [...new Set(spec.curves.filter((c) => c.style !== "reference").map((c) => c.group))];
-    return names.map((name, i) => {
-      const own = spec.curves.filter((curve) => curve.group === name);
+    const drawn = spec.curves.filter((curve) => curve.style !== "reference");
+    // Areas come first, in the same order and colour in every chart.
+    const { areas } = tieline.data;
+    const first = areas.filter((area) => drawn.some((curve) => curve.group === area));
+    const names = [...new Set([...first, ...drawn.map((curve) => curve.group)])];
+    const all = [...new Set([...(first.length ? areas : []), ...names])];
+    return names.map((name) => {
+      const own = drawn.filter((curve) => curve.group === name);
+      const place = all.indexOf(name);
       return {
         name,
         count: own.length,
         isShown: own.some((curve) => curve.style !== "hidden"),
-        colour: () => look.colour(i, names.length),
-        dash: look.dash(i, names.length),
+        colour: () => look.colour(place, all.length),
+        dash: first.length || own[0].style === "step" ? [] : look.dash(place, all.length),
       };
     });
   }
@@ -63,6 +69,8 @@
     ctx.strokeStyle = look.css("--soft");
     ctx.fillStyle = look.css("--soft");
     ctx.setLineDash([3, 3]);
+    ctx.textAlign = "left";
+    ctx.textBaseline = "alphabetic";
     ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
     let free = -Infinity;
     for (const [at, what] of tieline.data.events) {
@@ -107,6 +115,14 @@
     return at < 0 ? new Array(rows[0].length).fill(null) : rows[at + 1];
   }
 
+  /** Says in the legend which unit stands out. */
+  function nameFocus({ spec, host }) {
+    const chip = host.querySelector(".chip.strong");
+    if (!chip) return;
+    chip.hidden = !hasFocus(spec);
+    chip.lastChild.textContent = state.focus || "";
+  }
+
   function shareZoom(spec, chart) {
     if (spec.kind !== "time" || chart.status !== 1 || state.isSharing) return;
     const { min, max } = chart.scales.x;
@@ -130,9 +146,7 @@
     for (const curve of spec.curves.filter((one) => one.style === "reference")) {
       box.append(look.element("span", { className: "chip fixed" }, sample("var(--ink)", [6, 4]), curve.label));
     }
-    if (groups.length === 1 && !spec.curves.some((c) => c.style === "reference")) {
-      if (groups[0].count === 1) return box;
-    }
+    if (spec.curves.length === 1) return box;
     for (const group of groups) {
       const name = group.name + (group.count > 1 ? ` (${group.count})` : "");
       const chip = look.element("button", { className: "chip", type: "button" });
@@ -150,6 +164,9 @@
       look.onTheme(() => chip.firstChild.firstChild.setAttribute("stroke", group.colour()));
       box.append(chip);
     }
+    if (spec.curves.some((curve) => curve.unit)) {
+      box.append(look.element("span", { className: "chip fixed strong" }, sample("var(--strong)", []), document.createTextNode("")));
+    }
     return box;
   }
 
@@ -166,9 +183,10 @@
     const rows = spec.curves.map((c) => unpacked[tables.indexOf(c.table)][c.row]);
     const groups = groupsOf(spec);
     const data = [tieline.axisOf(tables[0]), ...rows];
+    const height = HEIGHTS[host.classList.contains("small") ? "small" : "usual"];
     const options = {
       width: host.clientWidth,
-      height: HEIGHT,
+      height,
       legend: { show: false },
       scales: { x: { time: false }, y: spec.from_zero ? { range: (u, low, high) => [0, (high || 1) * 1.05] } : {} },
       axes: axes(spec),
@@ -204,8 +222,9 @@
     plot.setAttribute("role", "img");
     plot.setAttribute("aria-label", `${spec.title}: ${spec.y} against ${spec.x}`);
     if (spec.note) host.append(look.element("p", { className: "note" }, spec.note));
-    const entry = { spec, chart, data };
+    const entry = { spec, chart, data, host };
     shown.set(spec.name, entry);
+    nameFocus(entry);
     if (spec.kind === "time") {
       entry.marker = look.element("div", { className: "marker", hidden: true });
       chart.over.append(entry.marker);
@@ -213,7 +232,7 @@
     }
     new ResizeObserver(() => {
       const width = host.clientWidth;
-      if (width && width !== chart.width) chart.setSize({ width, height: HEIGHT });
+      if (width && width !== chart.width) chart.setSize({ width, height });
       placeMarker(entry);
     }).observe(host);
     chart.over.addEventListener("mouseleave", () => look.tip(""));
@@ -236,7 +255,9 @@
     /** Makes a unit stand out in every chart; null for none. */
     setFocus(unit) {
       state.focus = unit;
-      for (const { spec, chart, data } of shown.values()) {
+      for (const entry of shown.values()) {
+        const { spec, chart, data } = entry;
+        nameFocus(entry);
         chart.setData([...data, focusRow(spec, data)], false);
         chart.redraw();
       }

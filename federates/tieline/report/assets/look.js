@@ -48,11 +48,11 @@
     return value.toFixed(size >= 100 ? 1 : size >= 20 ? 3 : size >= 0.1 || size === 0 ? 4 : 5);
   };
 
-  /** Returns the smallest of 1, 1.5, 2, 3, 5, 7.5 times a power of ten that is not below a value. */
+  /** Returns a round number that is not below a value, by at most a third above it. */
   look.nice = (value) => {
     if (!(value > 0)) return 1;
     const power = 10 ** Math.floor(Math.log10(value));
-    return [1, 1.5, 2, 3, 5, 7.5, 10].find((m) => m * power >= value * 0.999) * power;
+    return [1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10].find((m) => m * power >= value * 0.999) * power;
   };
 
   /** Returns an HTML element with properties and children. */

@@ -46,7 +46,10 @@
   async function start() {
     offerHighlight();
     const stage = document.querySelector(".drawing");
-    if (stage) await tieline.startReplay(stage, tieline.data.drawing).catch((error) => fail(stage, error));
+    if (stage) {
+      const started = tieline.startReplay(stage, tieline.data.drawing);
+      await drawOnce(await started.catch((error) => fail(stage, error)));
+    }
     tieline.setFocus(tieline.data.focus);
     const seen = new IntersectionObserver(
       (entries) => entries.filter((e) => e.isIntersecting).forEach((e) => drawOnce(e.target)),

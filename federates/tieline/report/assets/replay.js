@@ -81,7 +81,11 @@
       this.scales = this.makeScales(facts);
       this.now = look.element("dl", { className: "now" });
       this.happened = look.element("p", { className: "happened" });
-      this.panel.append(this.scales, this.now, this.happened, this.key(facts));
+      const overview = look.element("div", { className: "chart small" });
+      overview.dataset.name = "coi";
+      this.panel.append(this.scales, this.now, this.happened, overview);
+      picture.append(this.key(facts));
+      this.overview = overview;
     }
 
     makeScales(facts) {
@@ -112,7 +116,8 @@
     key(facts) {
       const signs = [
         ["circle", { cx: 8, cy: 8, r: 6, class: "station pmu" }, "station with a PMU"],
-        ["circle", { cx: 8, cy: 8, r: 4.5, class: "station" }, "station without"],
+        ["circle", { cx: 8, cy: 8, r: 5, class: "station" }, "without a PMU"],
+        ["circle", { cx: 8, cy: 8, r: 5, class: "station unknown" }, "no frequency there"],
         ["rect", { x: 4, y: 4, width: 8, height: 8, class: "unit" }, "unit (click to highlight)"],
       ];
       if (facts.units.some((unit) => unit.tripped_s !== null)) {
@@ -179,5 +184,6 @@
     const curves = Object.fromEntries(names.map((name, i) => [name, rows[i]]));
     tieline.replay = new Replay(host, facts, curves);
     performance.mark("drawing");
+    return tieline.replay.overview;
   };
 })();
