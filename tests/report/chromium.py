@@ -11,6 +11,7 @@ import os
 import select
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -32,6 +33,15 @@ FLAGS = (
     "--remote-debugging-pipe",
 )
 WAIT_S = 60.0
+
+START = """
+import fcntl, os, sys
+read, write = (fcntl.fcntl(int(end), fcntl.F_DUPFD, 10) for end in sys.argv[1:3])
+os.dup2(read, 3)
+os.dup2(write, 4)
+os.execv(sys.argv[3], sys.argv[3:])
+"""
+"""Puts the ends of two pipes on the descriptors that the browser looks for, and becomes it."""
 
 
 def executable() -> str | None:
@@ -164,10 +174,10 @@ def chromium(profile: Path) -> Iterator[Browser]:
     if path is None:
         raise RuntimeError(f"none of {', '.join(NAMES)} is installed")
     to_read, to_write = os.pipe(), os.pipe()
-    shell = f'exec "$@" 3<&{to_read[0]} 4>&{to_write[1]}'
-    command = ["sh", "-c", shell, "sh", path, *FLAGS, f"--user-data-dir={profile}", "about:blank"]
+    ends = [str(to_read[0]), str(to_write[1])]
+    command = [sys.executable, "-c", START, *ends, path, *FLAGS, f"--user-data-dir={profile}"]
     process = subprocess.Popen(
-        command, pass_fds=(to_read[0], to_write[1]), stdout=subprocess.DEVNULL,
+        [*command, "about:blank"], pass_fds=(to_read[0], to_write[1]), stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL,
     )  # fmt: skip
     os.close(to_read[0])
