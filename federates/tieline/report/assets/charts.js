@@ -63,6 +63,24 @@
     ];
   }
 
+  /** Returns what gives the vertical axis its range. */
+  function ranger(spec, rows) {
+    if (spec.from_zero) return (chart, low, high) => [0, (high || 1) * 1.05];
+    const drawn = rows.filter((row, i) => spec.curves[i].style !== "hidden");
+    const [least, most] = drawn.flat().reduce(
+      ([a, b], value) => (value === null ? [a, b] : [Math.min(a, value), Math.max(b, value)]),
+      [Infinity, -Infinity],
+    );
+    // Zoomed in on a rest, the axis would show the rounding, or fail to tell its own marks apart.
+    const narrowest = Math.max((most - least) * 2e-3, Math.abs(most) * 1e-6, 1e-9);
+    return (chart, low, high) => {
+      if (low === null || !Number.isFinite(low)) return [0, 1];
+      const middle = (low + high) / 2;
+      const half = Math.max(high - low, narrowest) * 0.55;
+      return [middle - half, middle + half];
+    };
+  }
+
   function markEvents(chart) {
     const { ctx, bbox } = chart;
     ctx.save();
@@ -124,14 +142,14 @@
   }
 
   function shareZoom(spec, chart) {
-    if (spec.kind !== "time" || chart.status !== 1 || state.isSharing) return;
+    if (spec.kind !== "time" || chart.status !== 1) return;
     const { min, max } = chart.scales.x;
+    // The others call this too, some time later: without this check they would go on for ever.
+    if (state.zoom && state.zoom.min === min && state.zoom.max === max) return;
     state.zoom = { min, max };
-    state.isSharing = true;
     for (const other of shown.values()) {
       if (other.chart !== chart && other.spec.kind === "time") other.chart.setScale("x", { min, max });
     }
-    state.isSharing = false;
   }
 
   function placeMarker(entry) {
@@ -188,7 +206,7 @@
       width: host.clientWidth,
       height,
       legend: { show: false },
-      scales: { x: { time: false }, y: spec.from_zero ? { range: (u, low, high) => [0, (high || 1) * 1.05] } : {} },
+      scales: { x: { time: false }, y: { range: ranger(spec, rows) } },
       axes: axes(spec),
       cursor: { focus: { prox: 30 }, points: { show: spec.curves.length <= 8, size: 7 }, drag: { x: true, y: false } },
       focus: { alpha: 1 },
