@@ -137,6 +137,11 @@ class Browser:
         answer = self.call("Page.captureScreenshot", format="png", **more)
         path.write_bytes(base64.b64decode(answer["data"]))
 
+    def close(self) -> None:
+        """Ask the browser to end."""
+        self._session = None
+        self.call("Browser.close")
+
     def _next(self) -> dict[str, Any]:
         while b"\0" not in self._received:
             if not select.select([self._read_fd], [], [], WAIT_S)[0]:
@@ -183,7 +188,11 @@ def chromium(profile: Path) -> Iterator[Browser]:
     os.close(to_read[0])
     os.close(to_write[1])
     try:
-        yield Browser(to_write[0], to_read[1])
+        browser = Browser(to_write[0], to_read[1])
+        yield browser
+        # It closes its files in peace, so that the profile can be removed.
+        browser.close()
+        process.wait(timeout=WAIT_S)
     finally:
         process.kill()
         process.wait()

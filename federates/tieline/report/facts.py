@@ -88,8 +88,8 @@ def points(runs: Sequence[Run]) -> Html:
     return Html(said + table(("point", *differ), rows, "Settings that differ", numbers_from=99))
 
 
-def answer(run: Run) -> Html:
-    """Return the answer of one run: its numbers, and what could not be told."""
+def answer(run: Run, events: Iterable[tuple[float, str]]) -> Html:
+    """Return the answer of one run: its numbers, what happened, and what could not be told."""
     summary = run.summary()
     rows: dict[str, list[tuple[str, str, str]]] = {f.path[0]: [] for f in FIELDS}
     for f in FIELDS:
@@ -105,7 +105,7 @@ def answer(run: Run) -> Html:
         of_the_network.append(("Mean age of the data acted on", f"{1e3 * age:.1f}", "ms"))
     of_the_network += rows["packets"] + _packets(summary.get("packets", {}))
     remarks = [summary.get("ending"), _no_swing(summary)]
-    happened = [(f"{at_s:.3f}", what) for at_s, what in run.events()]
+    happened = [(f"{at_s:.3f}", what) for at_s, what in events]
     tables = (
         _table_of_three("Grid", of_the_grid),
         _table_of_three("Network", of_the_network),
@@ -281,7 +281,9 @@ def _network(network: Mapping[str, Any]) -> str:
 
 def _event(event: Mapping[str, Any]) -> str:
     """Return an event as its settings have it, without those that are not given."""
-    return ", ".join(f"{key} {_shown(value)}" for key, value in event.items() if value is not None)
+    given = {key: value for key, value in event.items() if value is not None}
+    when = f"at {_shown(given.pop('at'))} s: " if "at" in given else ""
+    return when + ", ".join(f"{key} {_shown(value)}" for key, value in given.items())
 
 
 def _flat(config: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, str]]:

@@ -32,11 +32,12 @@ def write_run_page(run: Run, sweep: str | None = None) -> Path:
         put_grid(store, run)
         put_traffic(store, run)
         drawn = drawing(store, run)
+    events = _events(run)
     summary = run.summary() if run.is_complete else {}
     data = store.data() | {
         "drawing": drawn,
         "areas": _areas(run),
-        "events": _events(run),
+        "events": events,
         "focus": _focus(run),
         "begin_s": summary.get("frequency", {}).get("nadir_s", 0.0),
     }
@@ -44,7 +45,7 @@ def write_run_page(run: Run, sweep: str | None = None) -> Path:
     top = Html(facts.head(run.manifest, run.manifest["label"], str(run.manifest["seed"])) + up)
     sections = [("top", "", top), ("asked", "What was asked", facts.asked(run))]
     if run.is_complete:
-        sections.append(("answer", "The answer", facts.answer(run)))
+        sections.append(("answer", "The answer", facts.answer(run, events)))
     if drawn is not None:
         sections.append(("replay", "Replay", _replay(drawn["places"])))
     grid = [chart for chart in store.charts if chart.name in OF_THE_GRID]

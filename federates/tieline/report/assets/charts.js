@@ -90,7 +90,8 @@
     ctx.textAlign = "left";
     ctx.textBaseline = "alphabetic";
     ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
-    let free = -Infinity;
+    // Words that would run into each other stand on the next line; on the last one they are left out.
+    const free = [-Infinity, -Infinity, -Infinity];
     for (const [at, what] of tieline.data.events) {
       const x = Math.round(chart.valToPos(at, "x", true));
       if (x < bbox.left || x > bbox.left + bbox.width) continue;
@@ -98,10 +99,10 @@
       ctx.moveTo(x, bbox.top);
       ctx.lineTo(x, bbox.top + bbox.height);
       ctx.stroke();
-      if (x > free) {
-        ctx.fillText(what, x + 4, bbox.top + 11 * devicePixelRatio);
-        free = x + ctx.measureText(what).width + 8;
-      }
+      const line = free.findIndex((end) => x > end);
+      if (line < 0) continue;
+      ctx.fillText(what, x + 4, bbox.top + (11 + 13 * line) * devicePixelRatio);
+      free[line] = x + ctx.measureText(what).width + 8;
     }
     ctx.restore();
   }
