@@ -9,7 +9,10 @@ from tieline.report.html import Html, data_block, element, text
 ASSETS = Path(__file__).with_name("assets")
 LIBRARY = Path(__file__).with_name("vendor") / "uplot"
 
-SCRIPTS = ("unpack.js", "look.js", "charts.js", "zoom.js", "drawing.js", "replay.js", "main.js")
+SCRIPTS = (
+    "unpack.js", "look.js", "legend.js", "charts.js", "zoom.js", "places.js", "drawing.js",
+    "replay.js", "main.js",
+)  # fmt: skip
 """In the order in which they build on each other."""
 
 PAGE = "report.html"

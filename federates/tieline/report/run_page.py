@@ -7,6 +7,7 @@ from tieline.report import facts
 from tieline.report.drawing import drawing
 from tieline.report.grid_curves import put_grid
 from tieline.report.html import Html, element
+from tieline.report.network_tables import controllers_table, links_table
 from tieline.report.page import PAGE, charts, note, placeholder, write_page
 from tieline.report.store import Store, area_name
 from tieline.report.traffic_curves import put_traffic
@@ -53,7 +54,7 @@ def write_run_page(run: Run, sweep: str | None = None) -> Path:
     if grid:
         drawn_there = charts([chart.name for chart in grid])
         sections.append(("curves", "Grid and controllers", Html(note(ROUNDING) + drawn_there)))
-    tables = facts.links_table(run.table("links")) + facts.controllers_table(
+    tables = links_table(run.table("links")) + controllers_table(
         run.table("flows"), run.table("ages")
     )
     drawn_there = charts([chart.name for chart in network])

@@ -7,26 +7,6 @@
   const state = { focus: tieline.data.focus, time: null, zoom: null };
   const HEIGHTS = { usual: 270, small: 150 };
 
-  function groupsOf(spec) {
-    const drawn = spec.curves.filter((curve) => curve.style !== "reference");
-    // Areas come first, in the same order and colour in every chart.
-    const { areas } = tieline.data;
-    const first = areas.filter((area) => drawn.some((curve) => curve.group === area));
-    const names = [...new Set([...first, ...drawn.map((curve) => curve.group)])];
-    const all = [...new Set([...(first.length ? areas : []), ...names])];
-    return names.map((name) => {
-      const own = drawn.filter((curve) => curve.group === name);
-      const place = all.indexOf(name);
-      return {
-        name,
-        count: own.length,
-        isShown: own.some((curve) => curve.style !== "hidden"),
-        colour: () => look.colour(place, all.length),
-        dash: first.length || own[0].style === "step" ? [] : look.dash(place, all.length),
-      };
-    });
-  }
-
   function seriesOf(spec, curve, groups) {
     if (curve.style === "reference") {
       return { label: curve.label, stroke: () => look.css("--ink"), width: 2, dash: [6, 4] };
@@ -84,9 +64,8 @@
   function markEvents(chart) {
     const { ctx, bbox } = chart;
     ctx.save();
-    ctx.strokeStyle = look.css("--soft");
     ctx.fillStyle = look.css("--soft");
-    ctx.setLineDash([3, 3]);
+    ctx.lineJoin = "round";
     ctx.textAlign = "left";
     ctx.textBaseline = "alphabetic";
     ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
@@ -95,13 +74,21 @@
     for (const [at, what] of tieline.data.events) {
       const x = Math.round(chart.valToPos(at, "x", true));
       if (x < bbox.left || x > bbox.left + bbox.width) continue;
+      ctx.setLineDash([3, 3]);
+      ctx.lineWidth = devicePixelRatio;
+      ctx.strokeStyle = look.css("--soft");
       ctx.beginPath();
       ctx.moveTo(x, bbox.top);
       ctx.lineTo(x, bbox.top + bbox.height);
       ctx.stroke();
       const line = free.findIndex((end) => x > end);
       if (line < 0) continue;
-      ctx.fillText(what, x + 4, bbox.top + (11 + 13 * line) * devicePixelRatio);
+      const place = [what, x + 4, bbox.top + (11 + 13 * line) * devicePixelRatio];
+      ctx.setLineDash([]);
+      ctx.strokeStyle = look.css("--paper");
+      ctx.lineWidth = 4 * devicePixelRatio;
+      ctx.strokeText(...place);
+      ctx.fillText(...place);
       free[line] = x + ctx.measureText(what).width + 8;
     }
     ctx.restore();
@@ -160,51 +147,9 @@
     if (!entry.marker.hidden) entry.marker.style.left = `${entry.chart.valToPos(state.time, "x")}px`;
   }
 
-  function legend(spec, groups, chart) {
-    const box = look.element("div", { className: "legend" });
-    for (const curve of spec.curves.filter((one) => one.style === "reference")) {
-      box.append(look.element("span", { className: "chip fixed" }, sample("var(--ink)", [6, 4]), curve.label));
-    }
-    if (spec.curves.length === 1) return box;
-    for (const group of groups) {
-      const name = group.name + (group.count > 1 ? ` (${group.count})` : "");
-      const chip = look.element("button", { className: "chip", type: "button" });
-      chip.append(sample(group.colour(), group.count === 1 ? group.dash : []), name);
-      chip.setAttribute("aria-pressed", group.isShown);
-      chip.addEventListener("click", () => {
-        group.isShown = !group.isShown;
-        chip.setAttribute("aria-pressed", group.isShown);
-        chart.batch(() => {
-          spec.curves.forEach((curve, i) => {
-            if (curve.group === group.name) chart.setSeries(i + 1, { show: group.isShown });
-          });
-        });
-      });
-      look.onTheme(() => chip.firstChild.firstChild.setAttribute("stroke", group.colour()));
-      box.append(chip);
-    }
-    if (spec.curves.some((curve) => curve.unit)) {
-      box.append(look.element("span", { className: "chip fixed strong" }, sample("var(--strong)", []), document.createTextNode("")));
-    }
-    return box;
-  }
-
-  function sample(colour, dash) {
-    const line = look.svg("line", { x1: 1, y1: 5, x2: 23, y2: 5, stroke: colour, "stroke-width": 2.5 });
-    line.setAttribute("stroke-dasharray", dash.join(" "));
-    return look.svg("svg", { width: 24, height: 10, "aria-hidden": "true" }, line);
-  }
-
-  async function draw(host) {
-    const spec = tieline.data.charts.find((one) => one.name === host.dataset.name);
-    const tables = [...new Set(spec.curves.map((curve) => curve.table))];
-    const unpacked = await Promise.all(tables.map(tieline.table));
-    const rows = spec.curves.map((c) => unpacked[tables.indexOf(c.table)][c.row]);
-    const groups = groupsOf(spec);
-    const data = [tieline.axisOf(tables[0]), ...rows];
-    const height = HEIGHTS[host.classList.contains("small") ? "small" : "usual"];
-    const options = {
-      width: host.clientWidth,
+  function optionsOf(spec, rows, groups, width, height) {
+    return {
+      width,
       height,
       legend: { show: false },
       scales: { x: { time: false }, y: { range: ranger(spec, rows) } },
@@ -217,7 +162,7 @@
         { label: "highlighted", stroke: () => look.css("--strong"), width: 2.2, points: { show: false } },
       ],
       hooks: {
-        drawAxes: [(chart) => spec.kind === "time" && markEvents(chart)],
+        draw: [(chart) => spec.kind === "time" && markEvents(chart)],
         setSeries: [
           (chart, index) => chart.series.forEach((series, i) => (series.isNear = i === index)),
         ],
@@ -232,12 +177,22 @@
         ],
       },
     };
+  }
+
+  async function draw(host) {
+    const spec = tieline.data.charts.find((one) => one.name === host.dataset.name);
+    const tables = [...new Set(spec.curves.map((curve) => curve.table))];
+    const unpacked = await Promise.all(tables.map(tieline.table));
+    const rows = spec.curves.map((c) => unpacked[tables.indexOf(c.table)][c.row]);
+    const groups = tieline.groupsOf(spec);
+    const data = [tieline.axisOf(tables[0]), ...rows];
+    const height = HEIGHTS[host.classList.contains("small") ? "small" : "usual"];
     const plot = look.element("div", { className: "plot" });
     const title = look.element("h3", {}, spec.title);
     host.replaceChildren(title);
     host.append(plot);
-    const chart = new uPlot(options, [...data, focusRow(spec, data)], plot);
-    plot.before(legend(spec, groups, chart));
+    const chart = new uPlot(optionsOf(spec, rows, groups, host.clientWidth, height), [...data, focusRow(spec, data)], plot);
+    plot.before(tieline.legend(spec, groups, chart));
     plot.setAttribute("role", "img");
     plot.setAttribute("aria-label", `${spec.title}: ${spec.y} against ${spec.x}`);
     if (spec.note) host.append(look.element("p", { className: "note" }, spec.note));
