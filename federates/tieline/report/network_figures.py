@@ -40,9 +40,11 @@ def draw(folder: Path, plots: Path | None = None) -> list[Path]:
 
 
 def has_series(folder: Path) -> bool:
-    """Return whether a run's folder holds the series that `draw` needs."""
-    names = ("controller_series", "link_series")
-    return all((folder / f"{name}.parquet").is_file() for name in names)
+    """Return whether a run's folder holds the series that `draw` needs, with any packet in them."""
+    paths = [folder / f"{name}.parquet" for name in ("controller_series", "link_series")]
+    return all(path.is_file() for path in paths) and bool(
+        read_table(paths[0], ["delivered"])["delivered"].any()
+    )
 
 
 def controller_delays(series: pd.DataFrame) -> Figure:

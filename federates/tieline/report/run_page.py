@@ -48,7 +48,7 @@ def write_run_page(run: Run, sweep: str | None = None) -> Path:
     if run.is_complete:
         sections.append(("answer", "The answer", facts.answer(run, events)))
     if drawn is not None:
-        sections.append(("replay", "Replay", _replay(drawn["places"])))
+        sections.append(("replay", "Replay", _replay(drawn["places"], bool(drawn["links"]))))
     grid = [chart for chart in store.charts if chart.name in OF_THE_GRID]
     network = [chart for chart in store.charts if chart.name in OF_THE_NETWORK]
     if grid:
@@ -89,11 +89,12 @@ def _focus(run: Run) -> str | None:
     return str(chosen) if chosen and chosen not in run.tripped_units() else None
 
 
-def _replay(places: str) -> Html:
+def _replay(places: str, has_links: bool) -> Html:
+    links = " Beside them, each link has a line in either direction, keeping right."
     said = (
-        "The lines are transmission corridors; beside each, the link in either direction,"
-        " keeping right. A station's colour is its frequency (PMU, or else a rotor there), a"
-        " square is a unit with the age of its controller's data."
-        f" Places: {places}; they are no geography."
+        f"Thin lines are transmission corridors.{links if has_links else ''}"
+        " A station's colour is its frequency (PMU, or else a rotor there); a square is a unit"
+        f" with the age of its controller's data. Places: {places}; moved apart where they were"
+        " too near, and no geography."
     )
     return Html(placeholder("drawing", "run") + note(said))
