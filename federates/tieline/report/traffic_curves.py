@@ -23,7 +23,8 @@ def put_traffic(store: Store, run: Run) -> None:
 
 def directions(series: pd.DataFrame) -> list[tuple[str, str]]:
     """Return the directions of links that a `link_series` has rows of, in order."""
-    return sorted(set(zip(series["from"], series["to"], strict=True)))
+    pairs = series[["from", "to"]].drop_duplicates()
+    return sorted(zip(pairs["from"], pairs["to"], strict=True))
 
 
 def _put_controllers(store: Store, run: Run) -> None:
@@ -79,7 +80,9 @@ def _put_links(store: Store, series: pd.DataFrame) -> None:
     if series.empty:
         return
     pairs = directions(series)
-    series = series.assign(dropped=series[list(DROPS)].sum(axis=1), way=_numbers(series, pairs))
+    # Groups are numbered in the order of their sorted keys, which is that of the pairs.
+    ways = series.groupby(["from", "to"], sort=True).ngroup()
+    series = series.assign(dropped=series[list(DROPS)].sum(axis=1), way=ways)
     windows = np.array(sorted(set(series["t_s"])), np.float64)
     load = 100 * _wide(series, "utilisation", windows, len(pairs))
     queue = _wide(series, "max_queue", windows, len(pairs))
@@ -113,11 +116,6 @@ def _link_chart(
     labels = {i: " to ".join(pairs[i]) for i in shown}
     curves = [Curve(labels[i], table, i, labels[i], style="step") for i in shown]
     store.charts.append(Chart(table, title, y, curves, note, axis="window", from_zero=True))
-
-
-def _numbers(series: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> list[int]:
-    number = {pair: i for i, pair in enumerate(pairs)}
-    return [number[pair] for pair in zip(series["from"], series["to"], strict=True)]
 
 
 def _wide(series: pd.DataFrame, column: str, windows: Floats, count: int) -> Floats:
