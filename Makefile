@@ -7,13 +7,14 @@ PYTHON ?= $(shell for name in python3 python3.13 python3.12 python3.11; do \
 	$$name -c '$(IS_SUPPORTED)' 2>/dev/null && echo $$name && break; done)
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
-.PHONY: help demo test lint format wheel clean
+.PHONY: help demo test lint format docs wheel clean
 
 help:
 	@echo "make demo    run the trip of G26 under six delays, with a table and plots"
 	@echo "make test    run every test"
 	@echo "make lint    check style and types"
 	@echo "make format  bring every file into the house's format"
+	@echo "make docs    build the documentation as a site into build/site"
 	@echo "make wheel   build the wheel and the source distribution into dist/"
 	@echo "make clean   remove the environment and everything that was built"
 
@@ -31,6 +32,9 @@ lint: $(VENV)/development
 format: $(VENV)/development
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+docs: $(VENV)/development
+	$(BIN)/mkdocs build --strict
 
 wheel: $(VENV)/development
 	$(BIN)/python -m build

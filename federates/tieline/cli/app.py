@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 import tieline
-from tieline.cli import linear, models, report, run
+from tieline.cli import config, linear, models, report, run
 from tieline.cli.topology import topology
 from tieline.console import say
 from tieline.errors import InputError
@@ -44,6 +44,10 @@ for command in (
     run.validate,
     report.report,
     models.models,
+    config.schema,
+    config.show,
+    config.new,
+    config.cases,
     linear.modes,
     linear.freqresp,
     linear.damping,

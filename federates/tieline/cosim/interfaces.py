@@ -45,11 +45,14 @@ class FederationSettings(BaseModel):
             "HELICS core; inproc keeps both federates in one process, local leaves HELICS out"
         ),
     )
-    start_timeout: Seconds = Field(30.0, gt=0, description="longest wait for a federate to join, s")
+    start_timeout: Seconds = Field(
+        30.0, gt=0, le=3600, description="longest wait for a federate to join"
+    )
     hang_timeout: Seconds = Field(
         8.0,
         gt=0,
-        description="longest wall time without a grant before a federate counts as hung, s",
+        le=3600,
+        description="longest wall time without a grant before a federate counts as hung",
     )
 
 

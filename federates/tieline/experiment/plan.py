@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +12,14 @@ from tieline.cosim.interfaces import lead_of
 from tieline.errors import InputError
 from tieline.experiment.load import Study
 from tieline.experiment.schema import Experiment
-from tieline.experiment.sites import Sites, Survey, survey
-from tieline.experiment.sweep import Point
+from tieline.experiment.sites import Sites, Survey, Surveyor
+from tieline.experiment.sweep import Gathered, Point
 from tieline.network.settings import PACKET_ENGINES
 from tieline.problems import near
 from tieline.resources import case_folder, shipped
+
+_GIVEN = re.compile(r" \(got [^()]*\)")
+"""What points may be wrong in, each in its own way, with one sentence for all."""
 
 
 @dataclass(frozen=True)
@@ -53,26 +57,30 @@ def config_hash(experiment: Experiment) -> str:
     return hashlib.sha256(canonical_json(experiment.model_dump(mode="json")).encode()).hexdigest()
 
 
-def prepare(study: Study, survey: Survey = survey) -> Plan:
+def prepare(study: Study, survey: Survey | None = None) -> Plan:
     """Return the plan of a study, each of its points checked against its case and network.
 
     Args:
         study: a checked experiment.
-        survey: checks one point; points that differ in nothing it looks at are checked once.
+        survey: checks one point, in place of a `Surveyor`; points that differ in nothing it looks
+            at are checked once.
 
     Raises:
         InputError: every finding of every point.
     """
-    findings: list[str] = []
+    findings = Gathered()
     runs: list[PlannedRun] = []
     known: dict[str, Sites] = {}
+    look = Surveyor() if survey is None else survey
     for point in study.points:
         try:
-            runs.append(_planned(study, point, survey, known))
+            runs.append(_planned(study, point, look, known))
         except InputError as error:
-            findings += [study.located(finding, point) for finding in error.findings]
-    if findings:
-        raise InputError(dict.fromkeys(findings))
+            for finding in error.findings:
+                text = study.located(finding, point)
+                findings.add(_GIVEN.sub("", text), text, text != finding and bool(point.overrides))
+    if findings.lines():
+        raise InputError(findings.lines())
     return Plan(study, tuple(runs))
 
 
