@@ -28,6 +28,7 @@ def test_the_wheel_brings_one_package_with_its_cases_and_experiments(
     """A wheel without its cases could run nothing; one with `cases/` on top would litter."""
     names = wheel.namelist()
     assert {name.split("/")[0] for name in names} == {"tieline", "tieline-0.1.0.dist-info"}
+    assert "tieline/paper/page.html" in names
     wheel.extractall(tmp_path)
     script = (
         "import tieline; from tieline.resources import case_folder, shipped\n"

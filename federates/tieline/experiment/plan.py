@@ -10,6 +10,7 @@ from typing import Any
 
 from tieline.cosim.interfaces import lead_of
 from tieline.errors import InputError
+from tieline.experiment.guests import check_guests
 from tieline.experiment.load import Study
 from tieline.experiment.schema import Experiment
 from tieline.experiment.sites import Sites, Survey, Surveyor
@@ -94,6 +95,7 @@ def _planned(study: Study, point: Point, survey: Survey, known: dict[str, Sites]
     if key not in known:
         known[key] = survey(experiment, folder, topology)
     sites = known[key]
+    check_guests(experiment, sites)
     inputs = {"case": _folder_hash(folder)}
     if topology is not None:
         inputs["topology"] = hashlib.sha256(topology.read_bytes()).hexdigest()
@@ -104,11 +106,14 @@ def _planned(study: Study, point: Point, survey: Survey, known: dict[str, Sites]
         inputs["trace"] = hashlib.sha256(trace.read_bytes()).hexdigest()
     run = _run_file(point, sites, folder, topology) | {"grid": parts["grid"]}
     run["network"]["empirical"] = parts["network"]["empirical"]
+    if experiment.federation.guests:
+        run["guest_directory"] = str(beside.resolve())
     return PlannedRun(point, run, inputs, sites.interconnection)
 
 
 def _run_file(point: Point, sites: Sites, folder: Path, topology: Path | None) -> dict[str, Any]:
     experiment = point.experiment
+    guests = experiment.federation.guests
     settings = experiment.model_dump(mode="json")
     digest = config_hash(experiment)
     return {
@@ -118,7 +123,8 @@ def _run_file(point: Point, sites: Sites, folder: Path, topology: Path | None) -
         "clock": {
             "rate_hz": experiment.rate_hz,
             "intervals": experiment.intervals,
-            "lead": lead_of(experiment.rate_hz, sites.lookahead_ns),
+            # A guest is heard at every instant of the clock, not once a stride.
+            "lead": 0 if guests else lead_of(experiment.rate_hz, sites.lookahead_ns),
         },
         "federation": settings["federation"],
         "case": str(folder),
