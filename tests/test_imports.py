@@ -67,6 +67,16 @@ def test_what_reports_reads_result_folders_only(name: str) -> None:
     assert not begins(names, "tieline.grid", "tieline.network", "tieline.cosim", "tieline.wams")
 
 
+@pytest.mark.parametrize("path", part("report"), ids=lambda path: path.name)
+def test_a_page_is_written_from_result_folders_only(path: Path) -> None:
+    """A page must come out the same from a folder that was made elsewhere, by whatever made it."""
+    allowed = ("results", "table")
+    names = imports(path)
+    assert not begins(names, "tieline.grid", "tieline.network", "tieline.cosim", "tieline.wams")
+    known = begins(names, *(f"tieline.experiment.{name}" for name in allowed))
+    assert begins(names, "tieline.experiment") <= known
+
+
 def test_nothing_rests_on_the_reproduction_of_the_paper() -> None:
     """It uses everything; whatever used it would be tied to one paper."""
     for path in MODULES:

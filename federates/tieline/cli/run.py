@@ -44,7 +44,7 @@ def run(
     ] = None,
     debug: Debug = False,
 ) -> None:
-    """Run an experiment and write its result folder, with a table and plots."""
+    """Run an experiment and write its result folder, with a table, plots and a page."""
     with reporting(debug):
         if reference is None:
             say(WITHOUT_NAME)

@@ -25,11 +25,19 @@ _GIVEN = re.compile(r" \(got [^()]*\)")
 
 @dataclass(frozen=True)
 class PlannedRun:
-    """One run: its point, the content of its run file, and hashes of the files that it reads."""
+    """One run.
+
+    Attributes:
+        point: its settings.
+        run: the content of its run file.
+        inputs: hashes of the files that it reads.
+        interconnection: what a drawing of it needs, or None.
+    """
 
     point: Point
     run: Mapping[str, Any]
     inputs: Mapping[str, str]
+    interconnection: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -100,7 +108,7 @@ def _planned(study: Study, point: Point, survey: Survey, known: dict[str, Sites]
     run["network"]["empirical"] = parts["network"]["empirical"]
     if experiment.federation.guests:
         run["guest_directory"] = str(beside.resolve())
-    return PlannedRun(point, run, inputs)
+    return PlannedRun(point, run, inputs, sites.interconnection)
 
 
 def _run_file(point: Point, sites: Sites, folder: Path, topology: Path | None) -> dict[str, Any]:
