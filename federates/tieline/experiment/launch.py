@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 from tieline.cosim.interfaces import FEDERATES, GRID, NETWORK, FederationSettings
 from tieline.cosim.ports import reserved_port
 from tieline.errors import CosimError, TielineError
-from tieline.experiment.supervise import Child, ProcessUse, end_all
+from tieline.experiment.supervise import Child, ProcessUse, Start, end_all, executed
 from tieline.experiment.watch import Progress, Suspect, Watch
 
 BROKER = "broker"
@@ -77,6 +77,7 @@ def launch(
     commands: Mapping[str, Sequence[str]] | None = None,
     order: Sequence[str] = FEDERATES,
     stagger_s: float = 0.0,
+    start: Start = executed,
 ) -> Outcome:
     """Run the federation of `folder/run.json` to its end and return how it went.
 
@@ -86,6 +87,7 @@ def launch(
         commands: replaces entries of `COMMANDS`.
         order: which federate is started first.
         stagger_s: wall time between the two starts, s.
+        start: how each process comes to be.
 
     Raises:
         FederateFailedError: a process died, failed, hung or never joined; every process is ended by
@@ -97,7 +99,7 @@ def launch(
     settings = _settings(run)
     table = {**COMMANDS, **(commands or {})}
     with ExitStack() as stack:
-        stack.enter_context(_termination_as_interrupt())
+        stack.enter_context(termination_as_interrupt())
         if settings.core in ("inproc", "local"):
             starts = [(TOGETHER, [*table[TOGETHER], str(run_file)])]
         else:
@@ -105,7 +107,7 @@ def launch(
             _write_port(run_file, run, port)
             broker = [*table[BROKER], settings.core, str(port)]
             starts = [(BROKER, broker), *((name, [*table[name], str(run_file)]) for name in order)]
-        return _Launch(folder, settings, on_progress).run(starts, stagger_s)
+        return _Launch(folder, settings, on_progress, start).run(starts, stagger_s)
 
 
 class _Launch:
@@ -116,9 +118,11 @@ class _Launch:
         folder: Path,
         settings: FederationSettings,
         on_progress: Callable[[Progress], None] | None,
+        start: Start,
     ) -> None:
         self._folder = folder
         self._on_progress = on_progress
+        self._start_process = start
         self._watch = Watch(settings)
         self._children: dict[str, Child] = {}
         self._marks: dict[str, float] = {}
@@ -141,7 +145,7 @@ class _Launch:
                 time.sleep(stagger_s)
             log = self._folder / "logs" / f"{name}.log"
             try:
-                self._children[name] = Child(name, command, log)
+                self._children[name] = Child(name, command, log, self._start_process)
             except OSError as error:
                 self._fail(Suspect(name, f"could not be started: {error}", CosimError.exit_code))
 
@@ -240,7 +244,7 @@ def _write_port(run_file: Path, run: dict[str, Any], port: int) -> None:
 
 
 @contextmanager
-def _termination_as_interrupt() -> Iterator[None]:
+def termination_as_interrupt() -> Iterator[None]:
     """Have SIGTERM end a run as Ctrl-C does; left alone outside the main thread or if handled."""
     if (
         threading.current_thread() is not threading.main_thread()

@@ -6,10 +6,10 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any, Protocol
 
 import tieline
 from tieline.cosim.process import LAUNCHER_VARIABLE
@@ -28,6 +28,31 @@ class ProcessUse:
     exit_code: int
     cpu_s: float
     peak_bytes: int
+
+
+class Started(Protocol):
+    """A process that was started, in a session of its own, with pipes on its output."""
+
+    pid: int
+    stdout: IO[bytes] | None
+    stderr: IO[bytes] | None
+    returncode: int | None
+
+
+Start = Callable[[Sequence[str], Mapping[str, str]], Started]
+"""Starts a command in an environment, or raises an OSError."""
+
+
+def executed(command: Sequence[str], environment: Mapping[str, str]) -> Started:
+    """Start a command as a new program."""
+    return subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=environment,
+        start_new_session=True,
+    )
 
 
 class Log:
@@ -62,24 +87,20 @@ class Child:
         name: what the run calls it.
         command: the program and its arguments.
         log: where its standard error, and whatever else it says, is kept.
+        start: how the process comes to be.
 
     Attributes:
         exit_code: None while it runs; negative for the signal that killed it.
     """
 
-    def __init__(self, name: str, command: Sequence[str], log: Path) -> None:
+    def __init__(
+        self, name: str, command: Sequence[str], log: Path, start: Start = executed
+    ) -> None:
         self.name = name
         self.exit_code: int | None = None
         self.use: ProcessUse | None = None
         self._peak_bytes = 0
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env=_environment(),
-            start_new_session=True,
-        )
+        self._process = start(command, child_environment())
         self.log = Log(log)
         assert self._process.stdout is not None
         assert self._process.stderr is not None
@@ -197,7 +218,8 @@ def drain(children: Sequence[Child]) -> None:
             continue
 
 
-def _environment() -> dict[str, str]:
+def child_environment() -> dict[str, str]:
+    """Return the environment of a process that must not outlive this one."""
     environment = dict(os.environ)
     # The children run this very code, wherever it was imported from.
     source = str(Path(tieline.__file__).resolve().parent.parent)
