@@ -108,7 +108,7 @@ def sweep_manifest(plan: Plan, reason: str | None) -> dict[str, Any]:
         "points": points,
         "config_hash": hashlib.sha256(hashes.encode()).hexdigest(),
         "config_file": str(sources.document.path.resolve()),
-        "options": {_key(option.path): option.value for option in sources.options},
+        "options": [f"{_key(given.path)}={json.dumps(given.value)}" for given in sources.options],
         "versions": versions(),
     }
 

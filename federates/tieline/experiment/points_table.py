@@ -88,7 +88,7 @@ def _in_order(rows: Any) -> list[str]:
 
 def _of_one_kind(values: "pd.Series[Any]") -> Sequence[Any]:
     """Return a column that a file can hold: numbers, truths, or text where kinds are mixed."""
-    known = [value for value in values if value is not None and value == value]  # noqa: PLR0124
+    known = [value for value in values if value is not None and value == value]
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in known):
         return list(pd.to_numeric(values).astype("float64"))
     if all(isinstance(value, str) for value in known):

@@ -4,6 +4,7 @@ import shutil
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -24,7 +25,6 @@ from tieline.experiment.point import (
 from tieline.experiment.points_table import write_points
 from tieline.experiment.results import POINTS, SUMMARY, is_result, read_manifest, read_runs
 from tieline.experiment.sweep import Point
-
 
 MOST_LISTED = 20
 """Failed points that a message names."""
@@ -108,9 +108,7 @@ class InTurn:
         """Yield each task as it ends, in the order given."""
         for i, task in enumerate(tasks):
             try:
-                run_task(
-                    work_folder(task), task, self._launch, lambda time_s, i=i: on_time(i, time_s)
-                )
+                run_task(work_folder(task), task, self._launch, partial(on_time, i))
             except TielineError as error:
                 yield Ended(i, error)
             else:
@@ -121,7 +119,7 @@ def run_sweep(
     plan: Plan,
     target: Path,
     runner: Runner,
-    listener: Listener = Listener(),  # noqa: B008 - frozen
+    listener: Listener = Listener(),
     is_fresh: bool = False,
 ) -> Path:
     """Run the points of a sweep that are not yet finished in `target`, and return the folder.

@@ -93,4 +93,3 @@ def _code_of(run: Callable[[], None]) -> int:
         traceback.print_exc()
         return 1
     return 0
-

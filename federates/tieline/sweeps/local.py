@@ -2,11 +2,15 @@
 
 import os
 from collections.abc import Generator, Sequence
+from pathlib import Path
 
 from tieline.experiment.plan import Plan
 from tieline.experiment.point import Task
 from tieline.experiment.sweep_run import Ended, OnTime
 from tieline.sweeps.client import Done, Events, Nursery
+
+BYTES_A_POINT = 400_000_000
+"""Allowed for one point: its processes take some 100 MB each beside what all of them share."""
 
 _ATTEMPTS = 2
 
@@ -17,12 +21,23 @@ def cores() -> int:
 
 
 def default_jobs(plan: Plan) -> int:
-    """Return how many points to run at once: one a core.
+    """Return how many points to run at once: one a core, if memory allows.
 
-    Over zmq or tcp grid and network are processes of their own, but wait for each other most of the
-    time unless frames come late.
+    Over zmq or tcp, too: grid and network are then processes of their own, but wait for each other.
     """
-    return max(1, min(cores(), len(plan.runs)))
+    free = available_bytes()
+    fitting = cores() if free is None else free // BYTES_A_POINT
+    return max(1, min(cores(), len(plan.runs), fitting))
+
+
+def available_bytes() -> int | None:
+    """Return the memory that new processes can have, or None where the kernel does not tell."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+    except OSError:
+        return None
+    found = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]
+    return int(found[0]) * 1024 if found else None
 
 
 class LocalPool:
