@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 import tieline
-from tieline.cli import linear, models, report, run, sweep
+from tieline.cli import compare, linear, models, report, run, sweep
 from tieline.cli.topology import topology
 from tieline.console import say
 from tieline.errors import InputError
@@ -50,6 +50,8 @@ for command in (
     sweep.sweep,
     run.list_,
     run.validate,
+    compare.compare,
+    compare.plot,
     report.report,
     models.models,
     linear.modes,
