@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 import tieline
-from tieline.cli import compare, linear, models, report, run, sweep
+from tieline.cli import compare, doctor, linear, models, report, run, sweep
 from tieline.cli.topology import topology
 from tieline.console import say
 from tieline.errors import InputError
@@ -54,6 +54,7 @@ for command in (
     compare.plot,
     report.report,
     models.models,
+    doctor.doctor,
     linear.modes,
     linear.freqresp,
     linear.damping,

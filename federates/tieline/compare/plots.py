@@ -68,6 +68,10 @@ def draw(
         for axes, kind in zip(panels, kinds, strict=True):
             _panel(axes, runs, names, [one for one in quantities if one.kind == kind], window_s)
         panels[-1].set_xlabel("time, s")
+        if len(runs) > 1 and len(kinds) == len(quantities):
+            # Every panel would say the same.
+            for axes in panels[1:]:
+                axes.legend().remove()
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path)
 

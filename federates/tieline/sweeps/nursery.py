@@ -1,8 +1,8 @@
 """`python -m tieline.sweeps.nursery`: imports and compiles once, then forks a process a point.
 
 It reads JSON lines: first how to prepare (`core`, `rehearsal`), then orders with `id`, `work` and
-`task`. It writes JSON lines: `ready`, then with the `id` of an order `time_s` while a point goes on,
-`error` when it fails, and `exit_code` when its process has ended. It ends with its standard input.
+`task`. It writes JSON lines: `ready`, then with the `id` of an order `time_s` while a point goes
+on, `error` when it fails, and `exit_code` when its process has ended. It ends with its input.
 
 It has one thread and simulates nothing but a rehearsal of two intervals, which loads the compiled
 code; a point's process forks its federates in turn and watches them, so that whatever a point does
