@@ -5,7 +5,7 @@ import importlib.metadata
 import json
 import pathlib
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import tieline
@@ -87,13 +87,14 @@ def sweep_manifest(plan: Plan, reason: str | None) -> dict[str, Any]:
     """Return the manifest of a sweep; each of its points has one of its own."""
     runs, sources = plan.runs, plan.study.sources
     first = runs[0].point.experiment
+    paths = dict.fromkeys(own.path for run in runs for own in run.point.overrides)
     points = [
         {
             "label": run.point.label,
             "slug": run.point.slug,
             "run_id": run.run["run_id"],
             "config_hash": run.run["config_hash"],
-            "settings": _swept(run.point),
+            "settings": _swept(run.point, paths),
         }
         for run in runs
     ]
@@ -113,10 +114,10 @@ def sweep_manifest(plan: Plan, reason: str | None) -> dict[str, Any]:
     }
 
 
-def _swept(point: Point) -> dict[str, Any]:
-    """Return the settings that the sweep gives a point, in SI units, by their dotted names."""
+def _swept(point: Point, paths: Iterable[Path]) -> dict[str, Any]:
+    """Return a point's values, in SI units, of the settings that the sweep changes anywhere."""
     config = point.experiment.model_dump(mode="json")
-    return {_key(own.path): value_at(config, own.path) for own in point.overrides}
+    return {_key(path): value_at(config, path) for path in paths}
 
 
 def _key(path: Path) -> str:

@@ -5,6 +5,7 @@ it is running with it; Dask gives them to another, and what was finished stands 
 """
 
 import threading
+import time
 import uuid
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -20,7 +21,10 @@ from tieline.sweeps.client import Done, Events, Nursery
 
 _PLUGIN = "tieline"
 _CONNECT_S = 20.0
-_ATTEMPTS = 2
+_ATTEMPTS = 3
+_FORGET_S = 1.0
+"""Within this time a scheduler knows of a worker's death."""
+
 
 Told = tuple[str, int] | None
 """Message and exit code of a point that failed; None of one that ended well."""
@@ -128,17 +132,28 @@ def _connected(address: str) -> Iterator[Client]:
 
 @contextmanager
 def _installed(client: Client, plugin: PointsPlugin) -> Iterator[None]:
-    try:
-        client.register_plugin(plugin)
-    except Exception as error:
-        raise CosimError(
-            f"the Dask workers cannot take part: {type(error).__name__}: {error}; every worker"
-            " needs the same version of tieline"
-        ) from error
+    for attempt in range(1, _ATTEMPTS + 1):
+        try:
+            client.register_plugin(plugin)
+            break
+        except OSError as error:
+            # A worker that dies just now fails this for all; the next time it is not asked.
+            if attempt == _ATTEMPTS:
+                raise _unfit(error) from error
+            time.sleep(_FORGET_S)
+        except Exception as error:
+            raise _unfit(error) from error
     try:
         yield
     finally:
         client.unregister_worker_plugin(_PLUGIN)
+
+
+def _unfit(error: Exception) -> CosimError:
+    return CosimError(
+        f"the Dask workers cannot take part: {type(error).__name__}: {error}; every worker needs"
+        " the same version of tieline"
+    )
 
 
 def _error_of(future: Future) -> TielineError | None:
