@@ -47,7 +47,9 @@ def swept(folder: Path, launches: Launches, text: str = THREE, **how: bool) -> P
 def test_a_failed_point_does_not_lose_the_others(tmp_path: Path) -> None:
     """Otherwise one bad point would cost a night's sweep."""
     launches = Launches("0.25-s", NumericalError("diverged\n  | last words"))
-    with pytest.raises(PointsFailedError, match=r"1 of 3 points failed.*\n  0\.25 s: diverged\n") as e:
+    with pytest.raises(
+        PointsFailedError, match=r"1 of 3 points failed.*\n  0\.25 s: diverged\n"
+    ) as e:
         swept(tmp_path, launches)
     assert launches.slugs == ["ideal", "0.25-s", "slow"]
     assert e.value.exit_code == NumericalError.exit_code

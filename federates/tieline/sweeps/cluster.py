@@ -60,7 +60,7 @@ class DaskCluster:
                 key = f"tieline-{sweep}-{i}"
                 places[client.submit(run_point, task.to_json(), key=key, pure=False)] = i
             try:
-                for future in as_completed(places):
+                for future in as_completed(places, loop=client.loop):
                     yield Ended(places[future], _error_of(future))
             finally:
                 client.cancel(list(places), force=True)
