@@ -116,6 +116,18 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     assert read_manifest(tmp_path / "out")["kind"] == "run"
 
 
+def test_two_sweeps_never_work_in_one_folder(tmp_path: Path) -> None:
+    """Otherwise one would remove what the other is writing."""
+
+    def launch(folder: Path, on_progress: OnProgress) -> Outcome:
+        with pytest.raises(InputError, match="another sweep is at work"):
+            swept(tmp_path, Launches())
+        return fake_launch(folder, on_progress)
+
+    run_sweep(plan_of(tmp_path, EXPERIMENT + THREE), tmp_path / "out", InTurn(launch))
+    assert read_manifest(tmp_path / "out")["status"] == "complete"
+
+
 def test_the_table_has_swept_settings_then_figures_in_si_units(tmp_path: Path) -> None:
     """Otherwise each user would have to gather them from a hundred files."""
     folder = swept(tmp_path, Launches())

@@ -126,9 +126,9 @@ def broken(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Interrupting
 
 @pytest.fixture(scope="module")
 def whole(broken: tuple[Path, Interrupting]) -> tuple[Path, Course]:
-    """Return the same sweep after it was resumed with two points at once."""
+    """Return the same sweep, resumed with two points at once, and its nursery killed meanwhile."""
     folder, _ = broken
-    course = Course()
+    course = Course(lambda: os.kill(nursery(), signal.SIGKILL))
     run_sweep(plan_of(folder), folder / "out", LocalPool(2, "local"), course.listener())
     return folder / "out", course
 

@@ -1,8 +1,11 @@
 """Runs the points of a sweep into one folder: what is finished stays, what failed is listed."""
 
+import errno
+import fcntl
+import os
 import shutil
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -140,6 +143,11 @@ def run_sweep(
         PointsFailedError: points failed; all others are complete.
     """
     _open_folder(plan, target)
+    with _alone_in(target):
+        return _run_due(plan, target, runner, listener, is_fresh)
+
+
+def _run_due(plan: Plan, target: Path, runner: Runner, listener: Listener, is_fresh: bool) -> Path:
     tasks = [task_of(run, target / POINTS / run.point.slug) for run in plan.runs]
     due = [i for i, task in enumerate(tasks) if is_fresh or not _is_done(task)]
     points = [run.point for run in plan.runs]
@@ -203,6 +211,31 @@ def _open_folder(plan: Plan, target: Path) -> None:
         (target / POINTS).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"--out {target} cannot be written ({error.strerror})") from error
+
+
+@contextmanager
+def _alone_in(target: Path) -> Iterator[None]:
+    """Hold the folder's lock, which ends with this process at the latest.
+
+    Raises:
+        InputError: another sweep is at work in it.
+    """
+    descriptor = os.open(target, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        os.close(descriptor)
+        raise InputError(
+            f"another sweep is at work in {target}: wait for its end, or give another folder"
+        ) from error
+    except OSError as error:
+        # Some shared file systems lock no folders; a sweep must run there, too.
+        if error.errno not in (errno.ENOLCK, errno.EBADF, errno.EOPNOTSUPP):
+            raise
+    try:
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def _close_folder(plan: Plan, target: Path, reason: str | None) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import queue
+import shutil
 import signal
 import subprocess
 import sys
@@ -89,6 +90,8 @@ class Nursery:
             if self._is_over:
                 self._orphan(order)
                 return
+            # What a nursery that was killed has left of an earlier attempt.
+            shutil.rmtree(order.work, ignore_errors=True)
             self._count += 1
             self._orders[self._count] = order
             line = {"id": self._count, "work": str(order.work), "task": task.to_json()}

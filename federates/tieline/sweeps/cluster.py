@@ -84,9 +84,12 @@ class PointsPlugin(WorkerPlugin):
         """Start the nursery, from the thread that lives as long as the worker."""
         self._nursery = Nursery(self._core, self._rehearsal)
         self._lock = threading.Lock()
+        self._is_over = False
 
     def teardown(self, worker: Any) -> None:
         """End the nursery and whatever it runs."""
+        with self._lock:
+            self._is_over = True
         self._nursery.close()
 
     def run(self, task: Task) -> Told:
@@ -95,13 +98,13 @@ class PointsPlugin(WorkerPlugin):
             if is_finished(Path(task.folder), task.manifest):
                 return None
             done = self._attempt(task)
-            if not done.is_orphan:
+            if self._is_over or not done.is_orphan:
                 break
         return None if done.error is None else (str(done.error), done.error.exit_code)
 
     def _attempt(self, task: Task) -> Done:
         with self._lock:
-            if self._nursery.is_over:
+            if self._nursery.is_over and not self._is_over:
                 self._nursery.close()
                 self._nursery = Nursery(self._core, None)
         events: Events = Events()

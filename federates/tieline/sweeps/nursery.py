@@ -53,10 +53,10 @@ def main() -> None:
     warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
     lines = _Lines()
     nursery = _Nursery()
-    orders = iter(lines.read, None)
-    first = next(orders, None)
-    if first is not None:
-        _say({"ready": _prepare(first)})
+    first = lines.read()
+    if first is None:
+        return
+    _say({"ready": _prepare(first)})
     try:
         _serve(lines, nursery)
     finally:
