@@ -158,6 +158,17 @@ def test_where_points_run_is_checked(monkeypatch: pytest.MonkeyPatch) -> None:
         start.runner_of(planned, None, "tcp://x")
 
 
+def test_of_many_points_the_spread_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Otherwise a hundred rows and curves would hide what a study found."""
+    monkeypatch.setattr(run_command, "MOST_DRAWN", 1)
+    result = call("sweep", "swept.yaml", "--out", "out")
+    assert result.exit_code == 0, result.output
+    rows = {line.split()[0]: line.split()[1:] for line in result.stdout.splitlines() if line}
+    # The delays of the two points, 0 and 0.25 s, have their median between them.
+    assert rows["delay.mean_s"] == ["0", "ideal", "0.125", "0.25", "0.25", "s"]
+    assert "out/points.csv" in result.stdout
+
+
 def test_the_list_can_be_read_by_a_script() -> None:
     """Otherwise an editor's plug-in would have to parse prose."""
     things = json.loads(call("list", "--json").stdout)

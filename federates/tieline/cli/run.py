@@ -36,6 +36,10 @@ WITHOUT_NAME = """Give the name of a shipped experiment, or the path of a YAML f
 """
 
 
+MOST_DRAWN = 24
+"""Points of a sweep that a table and plots can show; of more, their spread is shown."""
+
+
 def run(
     reference: OptionalReference = None,
     settings: Settings = None,
@@ -197,12 +201,29 @@ def _run_single(study: Study, out: Path | None, quiet: bool, as_json: bool) -> N
 def _show(folder: Path, console: Console, quiet: bool, as_json: bool) -> None:
     """Write table and plots of a result, and show it as was asked for."""
     from tieline.experiment.report import report as write_report
+    from tieline.experiment.results import read_runs
 
-    write_report(folder, console)
+    if len(read_runs(folder)) > MOST_DRAWN:
+        _show_spread(folder, console)
+    else:
+        write_report(folder, console)
     if as_json:
         _print_json(folder)
     elif quiet:
         typer.echo(folder)
+
+
+def _show_spread(folder: Path, console: Console) -> None:
+    """Show what many points are like together, and where each stands."""
+    from tieline.experiment.points_table import spread
+
+    lines = [
+        spread(folder).to_string(float_format=lambda value: f"{value:.6g}"),
+        f"table   {folder / 'points.csv'}",
+        f"plots   of all points: tieline report {folder}",
+        f"plots   of some: tieline plot {folder}:LABEL QUANTITY...",
+    ]
+    console.print("\n".join(lines), markup=False, highlight=False, soft_wrap=True)
 
 
 def _print_json(folder: Path) -> None:

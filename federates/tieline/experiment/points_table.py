@@ -53,6 +53,33 @@ def points_table(folder: Path) -> pd.DataFrame:
     return table
 
 
+def spread(folder: Path) -> pd.DataFrame:
+    """Return least, median and greatest value of each figure over a sweep's complete points.
+
+    One row a figure that is a number, by its name, with the label of the point of either end.
+
+    Raises:
+        InputError: the folder is no result.
+    """
+    table = points_table(folder)
+    swept = _in_order(point["settings"] for point in read_manifest(folder)["points"])
+    rows = {}
+    for name in table.columns:
+        values = table[name].dropna()
+        if name in (*FIRST, *swept) or values.empty or values.dtype != "float64":
+            continue
+        labels = table["label"].to_numpy()[values.index]
+        least, greatest = values.to_numpy().argmin(), values.to_numpy().argmax()
+        rows[name] = {
+            "least": values.min(),
+            "at": labels[least],
+            "median": values.median(),
+            "greatest": values.max(),
+            "at ": labels[greatest],
+        }
+    return pd.DataFrame.from_dict(rows, orient="index")
+
+
 def _row(folder: Path, point: Mapping[str, Any]) -> dict[str, Any]:
     inside = f"{POINTS}/{point['slug']}"
     row: dict[str, Any] = {"label": point["label"], "folder": inside, "status": "missing"}
