@@ -121,15 +121,18 @@ class Nursery:
 
     def _read(self) -> None:
         assert self._process.stdout is not None
-        for text in self._process.stdout:
-            line = json.loads(text)
-            if "id" in line:
-                self._hear(line)
-        with self._lock:
-            self._is_over = True
-            for order in self._orders.values():
-                self._orphan(order)
-            self._orders.clear()
+        try:
+            for text in self._process.stdout:
+                # Whatever a library prints there is none of the protocol's.
+                if text.startswith(b'{"id"'):
+                    self._hear(json.loads(text))
+        finally:
+            # Whoever waits for an order must hear of it, whatever went wrong here.
+            with self._lock:
+                self._is_over = True
+                for order in self._orders.values():
+                    self._orphan(order)
+                self._orders.clear()
 
     def _hear(self, line: Mapping[str, Any]) -> None:
         order = self._orders[line["id"]]
