@@ -1,0 +1,80 @@
+"""Every command line of the documentation, as a reader would type it.
+
+Commands that simulate write the tables of a stand-in, as in `tests/test_cli.py`; everything else of
+them, and every other command, is real. A few are only parsed, each for the reason that it stands with.
+"""
+
+import re
+import shlex
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from synthetic_result import fake_launch
+from tieline.cli import app
+from tieline.cli import run as run_command
+from tieline.experiment.sweep_run import InTurn
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [page for page in PAGES if page.name != "cli_reference.md"]
+ZOO = ROOT / "tests" / "network" / "data" / "zoo"
+
+ONLY_PARSED = {
+    r"^doctor": "tests/doctor runs its federation",
+    r"^(broker|join|gather)": "tests/experiment and the mark netns run the sides of a federation",
+    r"^reproduce(?!.*--list)": "tests/paper runs items of it; all of them take minutes",
+    r"--scheduler": "tests/sweeps runs two workers",
+    r"^damping": "tests/test_cli_linear.py runs it on a real result",
+    r"^(report|compare) results/": "stands for a folder of the reader's",
+    r"guest_controller": "tests/scenarios runs the guest",
+}
+
+
+def commands(text: str) -> Iterator[tuple[str, str]]:
+    """Yield ('file', name) for each whole experiment of a page and ('run', words) for a command."""
+    for block in re.split(r"(```yaml\n.*?```)", text, flags=re.DOTALL):
+        if block.startswith("```yaml"):
+            content = block.removeprefix("```yaml\n").removesuffix("```")
+            if re.match(r"name: \w+\n", content) and "extends" not in content:
+                yield "file", content
+            continue
+        for line in re.findall(r"^ {4}(?:\.venv/bin/)?tieline ([a-z].*)$", block, re.MULTILINE):
+            yield "run", re.split(r"\s{3,}|\s>\s", line)[0]
+
+
+def parse(words: list[str]) -> None:
+    """Check that a command line names a command with its arguments and options."""
+    group = typer.main.get_command(app)
+    group.commands[words[0]].make_context(words[0], words[1:])  # type: ignore[attr-defined]
+
+
+@pytest.fixture
+def _stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(run_command, "launcher", lambda: fake_launch)
+    monkeypatch.setattr(run_command, "sweep_runner", lambda *_: InTurn(fake_launch))
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    for file in ZOO.glob("*.graphml"):
+        shutil.copy(file, tmp_path / "Geant.graphml")
+
+
+@pytest.mark.usefixtures("_stand_in")
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_every_command_of_a_page_works(page: Path) -> None:
+    """A reader who types what the page says must not be the first to do so."""
+    for kind, text in commands(page.read_text(encoding="utf-8")):
+        if kind == "file":
+            name = text.split()[1]
+            Path(f"{name}.yaml").write_text(text, encoding="utf-8")
+            continue
+        words = shlex.split(text)
+        if any(re.search(pattern, text) for pattern in ONLY_PARSED):
+            parse(words)
+            continue
+        result = CliRunner().invoke(app, words)
+        assert result.exit_code == 0, f"{text}\n{result.output}"
