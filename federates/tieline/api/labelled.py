@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -87,9 +87,9 @@ def _elements(names: list[str]) -> tuple[str, "np.ndarray[tuple[int], np.dtype[n
     return "unit", np.array(names)
 
 
-def _xarray() -> "type[xr]":  # type: ignore[valid-type]
+def _xarray() -> Any:
     try:
         import xarray
     except ImportError as error:
         raise InputError("xarray is not installed: pip install 'tieline[xarray]'") from error
-    return xarray  # type: ignore[return-value]
+    return xarray
