@@ -7,7 +7,7 @@ PYTHON ?= $(shell for name in python3 python3.13 python3.12 python3.11; do \
 	$$name -c '$(IS_SUPPORTED)' 2>/dev/null && echo $$name && break; done)
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
-.PHONY: help demo test smoke lint format wheel lock image clean
+.PHONY: help demo test smoke lint format docs wheel lock image clean
 
 help:
 	@echo "make demo    run the trip of G26 under six delays, with a table and plots"
@@ -15,6 +15,7 @@ help:
 	@echo "make smoke   run short federations over every core: does the chain work here?"
 	@echo "make lint    check style and types"
 	@echo "make format  bring every file into the house's format"
+	@echo "make docs    build the documentation as a site into build/site"
 	@echo "make wheel   build the wheel and the source distribution into dist/"
 	@echo "make lock    pin anew what the image installs (needs uv)"
 	@echo "make image   build the image tieline (needs docker)"
@@ -37,6 +38,9 @@ lint: $(VENV)/development
 format: $(VENV)/development
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+docs: $(VENV)/development
+	$(BIN)/mkdocs build --strict
 
 wheel: $(VENV)/development
 	$(BIN)/python -m build

@@ -97,6 +97,32 @@ def test_a_notebook_starts_federates_and_does_not_import_them() -> None:
         assert not begins(imports(path), *forbidden), path
 
 
+@pytest.mark.parametrize("path", part("report"), ids=lambda path: path.name)
+def test_a_page_is_written_from_result_folders_only(path: Path) -> None:
+    """A page must come out the same from a folder that was made elsewhere, by whatever made it."""
+    allowed = ("results", "table")
+    names = imports(path)
+    assert not begins(names, "tieline.grid", "tieline.network", "tieline.cosim", "tieline.wams")
+    known = begins(names, *(f"tieline.experiment.{name}" for name in allowed))
+    assert begins(names, "tieline.experiment") <= known
+
+
+def test_nothing_rests_on_the_reproduction_of_the_paper() -> None:
+    """It uses everything; whatever used it would be tied to one paper."""
+    for path in MODULES:
+        if path.relative_to(ROOT).parts[0] not in ("paper", "cli"):
+            assert not begins(imports(path), "tieline.paper"), path
+
+
+def test_only_the_worker_of_the_reproduction_holds_federates() -> None:
+    """Its runs go through plan and result folder like any other; one module knows the short cut."""
+    for path in part("paper"):
+        if path.name != "worker.py":
+            names = imports(path)
+            assert not begins(names, "tieline.grid.federate", "tieline.network.federate"), path
+            assert not begins(names, "tieline.cosim.local", "tieline.paper.worker"), path
+
+
 def test_floats_and_nanoseconds_meet_in_units_alone() -> None:
     """A second conversion is a second rounding."""
     conversion = re.compile(r"[*/]\s*1e-?9\b")

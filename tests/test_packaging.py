@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from tieline import report
+
+ASSETS = Path(report.__file__).with_name("assets")
 CHECKOUT = Path(__file__).resolve().parents[1]
 
 
@@ -25,6 +28,7 @@ def test_the_wheel_brings_one_package_with_its_cases_and_experiments(
     """A wheel without its cases could run nothing; one with `cases/` on top would litter."""
     names = wheel.namelist()
     assert {name.split("/")[0] for name in names} == {"tieline", "tieline-0.1.0.dist-info"}
+    assert "tieline/paper/page.html" in names
     wheel.extractall(tmp_path)
     script = (
         "import tieline; from tieline.resources import case_folder, shipped\n"
@@ -44,6 +48,18 @@ def test_the_wheel_brings_one_package_with_its_cases_and_experiments(
     assert Path(module).is_relative_to(tmp_path)
     assert case == "miniwecc"
     assert Path(configs) == tmp_path / "tieline" / "_data" / "configs"
+
+
+def test_the_wheel_brings_what_its_pages_are_made_of(wheel: zipfile.ZipFile) -> None:
+    """A page of an installed tieline would be words alone, or lack the library's licence."""
+    names = wheel.namelist()
+    inside = [name.removeprefix("tieline/report/") for name in names]
+    wanted = {f"assets/{path.name}" for path in ASSETS.iterdir()}
+    assert {"assets/main.js", "assets/style.css"} <= wanted <= set(inside)
+    assert {"vendor/uplot/uPlot.iife.min.js", "vendor/uplot/LICENSE"} <= set(inside)
+    assert any(
+        name.endswith("licenses/federates/tieline/report/vendor/uplot/LICENSE") for name in names
+    )
 
 
 def test_the_runner_of_a_checkout_runs_the_checkouts_own_code(tmp_path: Path) -> None:

@@ -21,6 +21,8 @@ STYLE: Any = {
     "legend.frameon": False,
     "legend.fontsize": 8.0,
     "savefig.dpi": 200,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "tieline",
 }
 COLOURS = ("viridis", 0.12, 0.88)
 """Sequential and safe for the colour-blind; its palest tenth would be lost on white paper."""
@@ -36,10 +38,15 @@ def colours(count: int) -> list[Any]:
 
 
 def save(folder: Path, figures: Mapping[str, Figure]) -> list[Path]:
-    """Write figures as PNG files into a folder, made if missing, and return the files."""
+    """Write figures as PNG and SVG into a folder, made if missing, and return the PNG files.
+
+    An SVG has letters as text, so that a paper's own typeface can replace them, and no date, so
+    that the same figure is the same file.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
     for name, figure in figures.items():
         paths.append(folder / f"{name}.png")
         figure.savefig(paths[-1])
+        figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
     return paths

@@ -74,7 +74,7 @@ MISTAKES = [
     ("  pss:\n    gain: 9\n    beta1: 1", "  pss: 9", 7, ["grid.pss must be a group of keys", "9"]),
     ("at: 1 s", "at: -1 s", 11, ["grid.events[0].at must be 0 s or more", "'-1 s'"]),
     ("at: 1 s, ", "", 11, ["missing key 'grid.events[0].at'"]),
-    ("trip_generator: G26", "trip_gen: G26", 11, ["trip_generator and trip_branch", "trip_gen"]),
+    ("trip_generator: G26", "trip_gen: G26", 11, ["unknown key 'trip_gen'", "'trip_generator'"]),
     ("trip_generator: G26", "trip_generator: 26", 11, ["trip_generator must be text", "26"]),
     ("trip_generator: G26", "trip_generator: G26, bus: 1", 11, ["unknown key 'bus'"]),
     ("{at: 1 s, trip_generator: G26}", "G26", 11, ["events[0] must be a group of keys"]),
@@ -115,7 +115,8 @@ MISTAKES = [
         ["network.delay has no effect", "constant"],
     ),
     ("engine: packet", "loss: 1", 16, ["network.loss must be less than 1"]),
-    ("engine: packet", "loss: 2 %", 16, ["network.loss must be a number", "'2 %'"]),
+    ("engine: packet", "loss: 2 km", 16, ["network.loss must be a share in one of %", "'2 km'"]),
+    ("engine: packet", "loss: some", 16, ["network.loss must be a number, or a share", "'some'"]),
     ("engine: packet", "record_packets: 1", 16, ["network.record_packets must be true or false"]),
     ("engine: packet", "delay: 5 km", 16, ["network.delay must be a time", "'5 km'"]),
     (

@@ -14,6 +14,7 @@ class FakeProcess:
 
     exit_code: int | None = None
     is_held: bool = False
+    reason: str | None = None
 
     def is_stopped(self) -> bool:
         """Return whether it is held."""

@@ -1,6 +1,7 @@
 """The figures, drawn from synthetic results."""
 
 from pathlib import Path
+from xml.etree import ElementTree
 
 import matplotlib.image
 import pytest
@@ -36,11 +37,14 @@ def runs_of(tmp_path: Path, text: str = EXPERIMENT + SWEEP) -> list[Run]:
         (EXPERIMENT, {"frequency", "voltage", "delays", "average", "overview"}),
     ],
 )
-def test_every_figure_is_a_png_of_sensible_size(tmp_path: Path, text: str, names: set[str]) -> None:
+def test_every_figure_is_an_svg_and_a_png_of_sensible_size(
+    tmp_path: Path, text: str, names: set[str]
+) -> None:
     """Otherwise `make demo` would end without the pictures that it promises."""
     paths = draw(tmp_path / "plots", runs_of(tmp_path, text))
     assert {path.stem for path in paths} == names
     for path in paths:
+        ElementTree.parse(path.with_suffix(".svg"))
         assert path.read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
         height, width, _ = matplotlib.image.imread(path).shape
         assert 600 <= width <= 2400

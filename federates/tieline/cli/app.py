@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 import tieline
-from tieline.cli import linear, models, report, run
+from tieline.cli import config, federation, linear, models, report, reproduce, run
 from tieline.cli.topology import topology
 from tieline.console import say
 from tieline.errors import InputError
@@ -44,9 +44,18 @@ for command in (
     run.validate,
     report.report,
     models.models,
+    config.schema,
+    config.show,
+    config.new,
+    config.cases,
+    federation.export_helics,
+    federation.broker,
+    federation.join,
+    federation.gather,
     linear.modes,
     linear.freqresp,
     linear.damping,
+    reproduce.reproduce,
 ):
-    app.command(command.__name__.rstrip("_"))(command)
+    app.command(command.__name__.rstrip("_").replace("_", "-"))(command)
 app.add_typer(topology)

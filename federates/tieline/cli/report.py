@@ -1,4 +1,4 @@
-"""`tieline report`: table and plots of a result folder."""
+"""`tieline report`: table, plots and page of a result folder."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +14,7 @@ def report(
     folder: Annotated[Path, typer.Argument(metavar="RESULT", help="a result folder")],
     debug: Debug = False,
 ) -> None:
-    """Write table and plots of a result folder again, and show the table."""
+    """Write table, plots and page of a result folder again, and show the table."""
     from tieline.experiment.report import report as write_report
 
     with reporting(debug):

@@ -9,6 +9,7 @@ from rich.console import Console
 from tieline.cli.options import Debug, Reference, Settings
 from tieline.console import reporting, say
 from tieline.errors import InputError
+from tieline.experiment.layers import read_layers
 from tieline.experiment.load import load_experiment, shipped_experiments
 from tieline.resources import shipped
 from tieline.yaml_lines import load as load_yaml
@@ -16,6 +17,8 @@ from tieline.yaml_lines import load as load_yaml
 if TYPE_CHECKING:
     from tieline.experiment.plan import Plan
     from tieline.experiment.run import Launch
+
+MOST_LABELS = 12
 
 WITHOUT_NAME = """Give the name of a shipped experiment, or the path of a YAML file of your own:
 
@@ -41,7 +44,7 @@ def run(
     ] = None,
     debug: Debug = False,
 ) -> None:
-    """Run an experiment and write its result folder, with a table and plots."""
+    """Run an experiment and write its result folder, with a table, plots and a page."""
     with reporting(debug):
         if reference is None:
             say(WITHOUT_NAME)
@@ -61,10 +64,11 @@ def validate(reference: Reference, settings: Settings = None, debug: Debug = Fal
     """Check an experiment with its case and network, and start nothing."""
     with reporting(debug):
         plan = planned(reference, settings or [])
-        labels = ", ".join(run.point.label for run in plan.runs) if plan.study.is_sweep else ""
-        say(
-            f"{plan.study.name} is valid: {len(plan.runs)} to run" + (f" ({labels})" * bool(labels))
-        )
+        labels = [run.point.label for run in plan.runs]
+        if len(labels) > MOST_LABELS:
+            labels[2:-1] = ["..."]
+        listed = f" ({', '.join(labels)})" if plan.study.is_sweep else ""
+        say(f"{plan.study.name} is valid: {len(plan.runs)} to run{listed}")
 
 
 def planned(reference: str, settings: list[str]) -> "Plan":
@@ -85,8 +89,8 @@ def catalogue() -> str:
     """Return the list of shipped experiments and cases."""
     lines = ["Experiments:"]
     for path in shipped_experiments():
-        data = load_yaml(path).data
-        lines += [f"  {path.stem}", f"      {' '.join(data['question'].split())}"]
+        question = " ".join(read_layers(path).data["question"].split())
+        lines += [f"  {path.stem}", f"      {question}"]
     lines.append("Cases:")
     for path in sorted(shipped("cases").glob("*/case.yaml")):
         lines.append(f"  {path.parent.name}: {load_yaml(path).data.get('title', '')}")

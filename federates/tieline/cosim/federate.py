@@ -7,6 +7,8 @@ import traceback
 from pathlib import Path
 from typing import Any
 
+from tieline.cosim.conventions import member_count, own_config
+from tieline.cosim.desks import desk_of
 from tieline.cosim.exchange import SIDES, Exchange
 from tieline.cosim.guard import GuardedParticipant
 from tieline.cosim.interfaces import Clock, OpenParticipant
@@ -19,8 +21,9 @@ from tieline.cosim.process import (
     reason_of,
     signals_held,
 )
-from tieline.cosim.runfile import federation_of, read_run
+from tieline.cosim.runfile import federation_of, read_config, read_run
 from tieline.cosim.status import Fault, Heartbeat, Status
+from tieline.cosim.word import leave_word
 from tieline.errors import CosimError
 
 _STDOUT = 1
@@ -37,11 +40,20 @@ class Federate:
         run: the run file's content.
         folder: the run folder.
         status: where it says how it is.
+        config: its HELICS configuration; None for that of the run.
     """
 
-    def __init__(self, name: str, run: dict[str, Any], folder: Path, status: Status) -> None:
+    def __init__(
+        self,
+        name: str,
+        run: dict[str, Any],
+        folder: Path,
+        status: Status,
+        config: dict[str, Any] | None = None,
+    ) -> None:
         self.name = name
         self.is_done = threading.Event()
+        self._config = config
         self._run = run
         self._folder = folder
         self._status = status
@@ -79,16 +91,21 @@ class Federate:
 
     def _take_part(self, open_participant: OpenParticipant) -> None:
         clock = Clock(**self._run["clock"])
-        settings, port = federation_of(self._run)
+        settings, place = federation_of(self._run)
         self._status.enter("opening")
-        participant = GuardedParticipant(open_participant(self._run, self._folder))
+        opened = open_participant(self._run, self._folder)
+        desk = desk_of(opened, self._run)
+        participant = GuardedParticipant(desk or opened)
         self._participant = participant
         self._status.enter("joining")
+        config = self._config or own_config(self.name, self._run, place, settings.start_timeout)
         with signals_held():
-            link = HelicsLink(self.name, settings.core, port, settings.start_timeout)
+            link = HelicsLink(self.name, config, member_count(self._run))
             self._link = link
         if self._stop is not None:
             raise CosimError(self._stop[0])
+        if desk is not None:
+            desk.open(link)
         link.start()
         self._status.enter("running")
         SIDES[self.name](participant, Exchange(self.name, link, clock, self._status), clock)
@@ -124,10 +141,12 @@ def main(name: str, open_participant: OpenParticipant) -> None:
     die_with_launcher()
     run, folder = read_run(sys.argv)
     status = Status(name, _STDOUT)
-    federate = Federate(name, run, folder, status)
+    federate = Federate(name, run, folder, status, read_config(sys.argv))
     on_termination(lambda signal_name: _terminate(federate, signal_name))
     with Heartbeat([status]):
         code = federate.serve(open_participant)
+    if run.get("leaves_word"):
+        leave_word(folder, status, code)
     end_process(code)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from tieline.cosim.conventions import Place
 from tieline.cosim.federate import Federate
 from tieline.cosim.interfaces import FEDERATES, OpenParticipant
 from tieline.cosim.link import Broker
@@ -25,7 +26,7 @@ class InProcess:
     def serve(self, openers: Mapping[str, OpenParticipant]) -> int:
         """Return the exit code of the run: that of the first federate that failed."""
         with signals_held():
-            broker = Broker("inproc", None)
+            broker = Broker(Place("inproc"), len(FEDERATES))
         threads = [
             threading.Thread(target=self._serve_one, args=(federate, openers[federate.name]))
             for federate in self._federates

@@ -3,12 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from tieline.cosim.guests import GuestSettings, guest_problems
 from tieline.errors import CosimError
 from tieline.units import NS_PER_S, Seconds, tick_ns
 
@@ -45,12 +46,25 @@ class FederationSettings(BaseModel):
             "HELICS core; inproc keeps both federates in one process, local leaves HELICS out"
         ),
     )
-    start_timeout: Seconds = Field(30.0, gt=0, description="longest wait for a federate to join, s")
+    start_timeout: Seconds = Field(
+        30.0, gt=0, le=3600, description="longest wait for a federate to join"
+    )
     hang_timeout: Seconds = Field(
         8.0,
         gt=0,
-        description="longest wall time without a grant before a federate counts as hung, s",
+        le=3600,
+        description="longest wall time without a grant before a federate counts as hung",
     )
+    guests: tuple[GuestSettings, ...] = Field(
+        (), description="federates of other people's that take part"
+    )
+
+    @model_validator(mode="after")
+    def _fit_guests(self) -> Self:
+        found = guest_problems(self.guests, self.core, FEDERATES)
+        if found:
+            raise ValueError("; ".join(found))
+        return self
 
 
 MOST_PER_MEETING = 10

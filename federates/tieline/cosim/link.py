@@ -1,25 +1,24 @@
 """A federate's place in a HELICS federation, and the broker that the federates meet at.
 
-The settings rest on what HELICS 3.6.1 was measured to do: both federates uninterruptible with a
-time step of 1 ns get exactly the times that they ask for, and a tick of 500 ms with a timeout of
-2 s notices a lost peer in 2 to 3 s, where the defaults take half a minute.
+The configuration rests on what HELICS 3.6.1 was measured to do: federates that are uninterruptible
+with a time step of 1 ns get exactly the times that they ask for.
 """
 
+import json
 import sys
 import time
+from collections.abc import Mapping
 from typing import Any
 
 import helics
 
+from tieline.cosim.conventions import BROKER_NAME, Place, broker_options
 from tieline.cosim.exchange import PEER
-from tieline.cosim.interfaces import ENDPOINTS, FEDERATES
+from tieline.cosim.interfaces import ENDPOINTS
 from tieline.cosim.wire import PART_LIMIT_BYTES
 from tieline.errors import CosimError
 from tieline.units import ns_to_seconds, seconds_to_ns
 
-BROKER_NAME = "tieline"
-_HOST = "127.0.0.1"
-_WATCH = "--tick=500ms --timeout=2s --loglevel=warning"
 _ERROR_CODE = CosimError.exit_code
 _LONGEST_REASON = 500
 _LOOK_S = 0.02
@@ -30,32 +29,25 @@ class FederationEndedError(CosimError):
 
 
 class HelicsLink:
-    """A message federate with one endpoint.
+    """A message federate with its endpoint for bundles, and others if it is configured so.
 
     Args:
         name: `grid` or `network`.
-        core: `zmq`, `tcp` or `inproc`.
-        broker_port: where the broker listens; None for inproc.
-        connect_s: longest wait for the broker, s.
+        config: the federate's HELICS configuration.
+        members: how many federates the federation has.
 
     Raises:
         FederationEndedError: the broker does not answer or refuses.
     """
 
-    def __init__(self, name: str, core: str, broker_port: int | None, connect_s: float) -> None:
-        self.limit_bytes = PART_LIMIT_BYTES.get(core)
+    def __init__(self, name: str, config: Mapping[str, Any], members: int) -> None:
+        self.limit_bytes = PART_LIMIT_BYTES.get(config["core_type"])
         self._peer = ENDPOINTS[PEER[name]]
-        info = helics.helicsCreateFederateInfo()
-        helics.helicsFederateInfoSetCoreTypeFromString(info, core)
-        helics.helicsFederateInfoSetCoreInitString(info, _core_options(broker_port, connect_s))
-        helics.helicsFederateInfoSetFlagOption(info, helics.HELICS_FLAG_UNINTERRUPTIBLE, True)
-        helics.helicsFederateInfoSetTimeProperty(info, helics.HELICS_PROPERTY_TIME_DELTA, 1e-9)
+        self._members = members
         try:
-            self._federate = helics.helicsCreateMessageFederate(name, info)
+            self._federate = helics.helicsCreateMessageFederateFromConfig(json.dumps(config))
             self._core = helics.helicsFederateGetCore(self._federate)
-            self._endpoint = helics.helicsFederateRegisterGlobalEndpoint(
-                self._federate, ENDPOINTS[name]
-            )
+            self._endpoint = helics.helicsFederateGetEndpoint(self._federate, ENDPOINTS[name])
         except helics.HelicsException as error:
             raise FederationEndedError(f"{name} could not join the federation: {error}") from error
 
@@ -89,21 +81,15 @@ class HelicsLink:
         Raises:
             FederationEndedError: the federation takes no more messages.
         """
-        try:
-            helics.helicsEndpointSendBytesToAt(
-                self._endpoint, data, self._peer, ns_to_seconds(at_ns)
-            )
-        except helics.HelicsException as error:
-            raise FederationEndedError(f"the federation takes no more messages: {error}") from error
+        _send(self._endpoint, self._peer, data, at_ns)
 
     def receive(self) -> list[tuple[int, bytes]]:
         """Return what has come since the last call, as (stamp in ns, message)."""
-        messages = []
-        while helics.helicsEndpointHasMessage(self._endpoint):
-            message = helics.helicsEndpointGetMessage(self._endpoint)
-            stamp_ns = seconds_to_ns(helics.helicsMessageGetTime(message))
-            messages.append((stamp_ns, bytes_of(message)))
-        return messages
+        return [(stamp_ns, data) for _, stamp_ns, data in _received(self._endpoint)]
+
+    def endpoint(self, name: str) -> "Endpoint":
+        """Return another endpoint that the configuration has."""
+        return Endpoint(helics.helicsFederateGetEndpoint(self._federate, name))
 
     def fail(self, reason: str) -> None:
         """End the whole federation with `reason`, even while another thread waits in it."""
@@ -129,29 +115,45 @@ class HelicsLink:
         query = helics.helicsCreateQuery("root", "federates")
         while helics.helicsCoreIsConnected(self._core):
             joined = helics.helicsQueryExecute(query, self._federate)
-            if isinstance(joined, list) and len(joined) >= len(FEDERATES):
+            if isinstance(joined, list) and len(joined) >= self._members:
                 return
             time.sleep(_LOOK_S)
         raise FederationEndedError("the federation ended while waiting for the other federates")
 
 
+class Endpoint:
+    """An endpoint that hears from and speaks to whoever is named."""
+
+    def __init__(self, endpoint: helics.HelicsEndpoint) -> None:
+        self._endpoint = endpoint
+
+    def send(self, to: str, data: bytes, at_ns: int) -> None:
+        """Send a message that comes `at_ns`, or now where that has passed."""
+        _send(self._endpoint, to, data, at_ns)
+
+    def receive(self) -> list[tuple[str, int, bytes]]:
+        """Return what has come since the last call, as (source, stamp in ns, message)."""
+        return _received(self._endpoint)
+
+
 class Broker:
-    """The broker of one federation, run by this process on the loopback interface.
+    """The broker of one federation, run by this process.
 
     Args:
-        core: `zmq`, `tcp` or `inproc`.
-        port: where to listen; None for inproc.
+        place: where it listens.
+        members: how many federates it waits for.
 
     Raises:
         CosimError: it could not listen there.
     """
 
-    def __init__(self, core: str, port: int | None) -> None:
-        where = "" if port is None else f" --port={port} --local_interface={_HOST}"
-        options = f"--federates={len(FEDERATES)}{where} {_WATCH}"
-        self._broker = helics.helicsCreateBroker(core, BROKER_NAME, options)
+    def __init__(self, place: Place, members: int) -> None:
+        options = broker_options(place, members)
+        self._broker = helics.helicsCreateBroker(place.core, BROKER_NAME, options)
         if not helics.helicsBrokerIsConnected(self._broker):
-            raise CosimError(f"the {core} broker could not listen on {_HOST}:{port}")
+            raise CosimError(
+                f"the {place.core} broker could not listen on {place.host}:{place.port}"
+            )
 
     def wait(self, wait_s: float) -> bool:
         """Return whether the federation is over, after waiting for that at most `wait_s`."""
@@ -166,8 +168,17 @@ def bytes_of(message: Any) -> bytes:
     return bytes(helics.capi.ffi.buffer(start, size_bytes))
 
 
-def _core_options(broker_port: int | None, connect_s: float) -> str:
-    options = f"--federates=1 {_WATCH} --networktimeout={round(connect_s * 1e3)}ms"
-    if broker_port is None:
-        return f"{options} --broker={BROKER_NAME}"
-    return f"{options} --brokeraddress={_HOST} --brokerport={broker_port}"
+def _send(endpoint: helics.HelicsEndpoint, to: str, data: bytes, at_ns: int) -> None:
+    try:
+        helics.helicsEndpointSendBytesToAt(endpoint, data, to, ns_to_seconds(at_ns))
+    except helics.HelicsException as error:
+        raise FederationEndedError(f"the federation takes no more messages: {error}") from error
+
+
+def _received(endpoint: helics.HelicsEndpoint) -> list[tuple[str, int, bytes]]:
+    messages = []
+    while helics.helicsEndpointHasMessage(endpoint):
+        message = helics.helicsEndpointGetMessage(endpoint)
+        stamp_ns = seconds_to_ns(helics.helicsMessageGetTime(message))
+        messages.append((helics.helicsMessageGetSource(message), stamp_ns, bytes_of(message)))
+    return messages

@@ -5,7 +5,7 @@ import os
 import threading
 import time
 from collections.abc import Iterable
-from typing import Literal
+from typing import Any, Literal
 
 State = Literal["opening", "joining", "running", "finishing", "finished", "failed"]
 Fault = Literal["own", "other"]
@@ -25,10 +25,16 @@ class Status:
         self.federate = federate
         self.state: State = "opening"
         self._descriptor = descriptor
+        self._began_s = time.monotonic()
         self._k = -1
         self._granted_ns = -1
         self._waits = False
         self._failure: dict[str, str | int] = {}
+
+    @property
+    def wall_s(self) -> float:
+        """Wall time since this was made, s."""
+        return time.monotonic() - self._began_s
 
     def enter(self, state: State) -> None:
         """Change the state and say so at once."""
@@ -49,9 +55,9 @@ class Status:
             self._failure = {"reason": reason, "fault": fault, "exit_code": exit_code}
             self.enter("failed")
 
-    def write(self) -> None:
-        """Write one line; a reader that is gone is no reason to stop here."""
-        line = {
+    def line(self) -> dict[str, Any]:
+        """Return what is written."""
+        return {
             "federate": self.federate,
             "state": self.state,
             "k": self._k,
@@ -60,9 +66,12 @@ class Status:
             "cpu_s": round(time.process_time(), 3),
             **self._failure,
         }
+
+    def write(self) -> None:
+        """Write one line; a reader that is gone is no reason to stop here."""
         try:
             # One write, so that lines of several threads never mix.
-            os.write(self._descriptor, json.dumps(line).encode() + b"\n")
+            os.write(self._descriptor, json.dumps(self.line()).encode() + b"\n")
         except BrokenPipeError:
             self._descriptor = os.open(os.devnull, os.O_WRONLY)
 

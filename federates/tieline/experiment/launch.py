@@ -12,9 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-from tieline.cosim.interfaces import FEDERATES, GRID, NETWORK, FederationSettings
+from tieline.cosim.conventions import member_count
+from tieline.cosim.interfaces import FEDERATES, GRID, NETWORK
 from tieline.cosim.ports import reserved_port
+from tieline.cosim.runfile import federation_of
 from tieline.errors import CosimError, TielineError
+from tieline.experiment.guests import GuestProcess, guest_processes
+from tieline.experiment.remote import Remote
 from tieline.experiment.supervise import Child, ProcessUse, end_all
 from tieline.experiment.watch import Progress, Suspect, Watch
 
@@ -94,42 +98,64 @@ def launch(
     """
     run_file = folder / "run.json"
     run = json.loads(run_file.read_text(encoding="utf-8"))
-    settings = _settings(run)
+    settings, _ = federation_of(run)
     table = {**COMMANDS, **(commands or {})}
     with ExitStack() as stack:
-        stack.enter_context(_termination_as_interrupt())
+        stack.enter_context(termination_as_interrupt())
         if settings.core in ("inproc", "local"):
             starts = [(TOGETHER, [*table[TOGETHER], str(run_file)])]
         else:
             port = stack.enter_context(reserved_port())
             _write_port(run_file, run, port)
-            broker = [*table[BROKER], settings.core, str(port)]
+            members = f"--federates={member_count(run)}"
+            broker = [*table[BROKER], settings.core, str(port), members]
             starts = [(BROKER, broker), *((name, [*table[name], str(run_file)]) for name in order)]
-        return _Launch(folder, settings, on_progress).run(starts, stagger_s)
+        guests = guest_processes(run, folder)
+        return Processes(folder, Watch(settings), on_progress, guests).run(starts, stagger_s)
 
 
-class _Launch:
-    """The processes of one run and what is known of them."""
+class Processes:
+    """The processes of one run and what is known of them.
+
+    Args:
+        folder: the run folder.
+        watch: judges them.
+        on_progress: called with every word of a federate about itself.
+        guests: started once the federates are ready to join.
+        remotes: processes of other hosts.
+        on_fault: told who is at fault, or that the user is, before everything is ended.
+        on_word: given every word as it came.
+    """
 
     def __init__(
         self,
         folder: Path,
-        settings: FederationSettings,
+        watch: Watch,
         on_progress: Callable[[Progress], None] | None,
+        guests: Sequence[GuestProcess] = (),
+        *,
+        remotes: Sequence[Remote] = (),
+        on_fault: Callable[[Suspect], None] | None = None,
+        on_word: Callable[[Mapping[str, Any]], None] | None = None,
     ) -> None:
         self._folder = folder
         self._on_progress = on_progress
-        self._watch = Watch(settings)
-        self._children: dict[str, Child] = {}
+        self._watch = watch
+        self._guests = list(guests)
+        self._on_fault = on_fault
+        self._on_word = on_word
+        self._children: dict[str, Child | Remote] = {remote.name: remote for remote in remotes}
         self._marks: dict[str, float] = {}
 
-    def run(self, starts: Sequence[tuple[str, list[str]]], stagger_s: float) -> Outcome:
+    def run(self, starts: Sequence[tuple[str, list[str]]], stagger_s: float = 0.0) -> Outcome:
         """Return the outcome once every process has ended well."""
         self._marks["start"] = time.monotonic()
         try:
             self._start(starts, stagger_s)
             self._follow()
         except BaseException as error:
+            if isinstance(error, KeyboardInterrupt) and self._on_fault is not None:
+                self._on_fault(Suspect(starts[0][0], "interrupted", CosimError.exit_code))
             self._end()
             self._salvage(error)
             raise
@@ -139,16 +165,26 @@ class _Launch:
         for name, command in starts:
             if name in FEDERATES and any(other in FEDERATES for other in self._children):
                 time.sleep(stagger_s)
-            log = self._folder / "logs" / f"{name}.log"
-            try:
-                self._children[name] = Child(name, command, log)
-            except OSError as error:
-                self._fail(Suspect(name, f"could not be started: {error}", CosimError.exit_code))
+            self._start_one(name, command, None)
+
+    def _start_one(self, name: str, command: Sequence[str], directory: Path | None) -> None:
+        log = self._folder / "logs" / f"{name}.log"
+        try:
+            self._children[name] = Child(name, command, log, directory)
+        except OSError as error:
+            self._fail(Suspect(name, f"could not be started: {error}", CosimError.exit_code))
+
+    def _start_guests(self) -> None:
+        """Start the guests once the federates are opened, so that none waits for a compiler."""
+        while self._guests and self._watch.is_opened():
+            guest = self._guests.pop()
+            self._start_one(guest.name, guest.command, guest.directory)
 
     def _follow(self) -> None:
         before_s = time.monotonic()
         while any(child.exit_code is None for child in self._children.values()):
             self._wait()
+            self._start_guests()
             now_s = time.monotonic()
             self._watch.pass_time(now_s - before_s)
             before_s = now_s
@@ -175,6 +211,8 @@ class _Launch:
     def _hear(self) -> None:
         for child in self._children.values():
             for message in child.read():
+                if self._on_word is not None:
+                    self._on_word(message)
                 progress = self._watch.hear(message)
                 if progress is not None and self._on_progress is not None:
                     self._on_progress(progress)
@@ -193,6 +231,8 @@ class _Launch:
         self._fail(suspect)
 
     def _fail(self, suspect: Suspect) -> NoReturn:
+        if self._on_fault is not None:
+            self._on_fault(suspect)
         self._end()
         child = self._children.get(suspect.name, self._children.get(TOGETHER))
         tail = () if child is None else tuple(child.log.tail)
@@ -227,11 +267,6 @@ class _Launch:
             error.add_note(f"what was written could not be made readable: {second}")
 
 
-def _settings(run: Mapping[str, Any]) -> FederationSettings:
-    stated = {key: value for key, value in run["federation"].items() if key != "broker_port"}
-    return FederationSettings(**stated)
-
-
 def _write_port(run_file: Path, run: dict[str, Any], port: int) -> None:
     run["federation"] = {**run["federation"], "broker_port": port}
     part = run_file.with_suffix(".part")
@@ -240,7 +275,7 @@ def _write_port(run_file: Path, run: dict[str, Any], port: int) -> None:
 
 
 @contextmanager
-def _termination_as_interrupt() -> Iterator[None]:
+def termination_as_interrupt() -> Iterator[None]:
     """Have SIGTERM end a run as Ctrl-C does; left alone outside the main thread or if handled."""
     if (
         threading.current_thread() is not threading.main_thread()

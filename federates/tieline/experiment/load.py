@@ -1,17 +1,24 @@
-"""Reads an experiment whole: file, `--set` options and sweep; every finding in one message."""
+"""Reads an experiment whole: files, `--set` options and sweep; every finding in one message."""
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tieline import yaml_lines
 from tieline.errors import InputError
-from tieline.experiment.overrides import Sources, apply, parse_settings, path_of, shortest
+from tieline.experiment.layers import (
+    EXTENDS,
+    find_experiment,
+    read_layers,
+    shipped_experiments,
+    shortest,
+)
+from tieline.experiment.overrides import Sources, apply, parse_settings, path_of
 from tieline.experiment.schema import Experiment
 from tieline.experiment.sweep import Point, expand, judge
-from tieline.problems import checked, near
-from tieline.resources import shipped
+from tieline.problems import checked
+
+__all__ = ["Study", "find_experiment", "load_experiment", "shipped_experiments"]
 
 _SETTING = re.compile(r"((?:grid|wams|network|case)(?:\.\w+|\[\d+\])*)(?=[\s:])")
 
@@ -21,24 +28,26 @@ class Study:
     """An experiment as it will be run: one point, or the points of its sweep.
 
     Attributes:
-        sources: the file and the options that it came from.
+        sources: the files and the options that it came from.
         points: the runs, in order; at least one.
         is_sweep: whether it asks for a sweep, of however many points.
+        base: the experiment without its sweep, as the files and options have it.
     """
 
     sources: Sources
     points: tuple[Point, ...]
     is_sweep: bool
+    base: Experiment
 
     @property
     def name(self) -> str:
         """The experiment's name."""
-        return self.points[0].experiment.name
+        return self.base.name
 
     @property
     def question(self) -> str:
         """The question it answers."""
-        return self.points[0].experiment.question
+        return self.base.question
 
     def located(self, finding: str, point: Point) -> str:
         """Return a finding about a point with the place that it speaks of in front.
@@ -53,30 +62,6 @@ class Study:
         return f"{self.sources.where([path], point.overrides)}: {finding}"
 
 
-def find_experiment(reference: str) -> Path:
-    """Return the file of an experiment given by its path or by a shipped name.
-
-    Raises:
-        InputError: there is no such file; the message lists the shipped experiments.
-    """
-    path = Path(reference)
-    if path.is_file():
-        return path
-    by_name = shipped("configs") / f"{reference}.yaml"
-    if re.fullmatch(r"[\w-]+", reference) and by_name.is_file():
-        return by_name
-    names = [path.stem for path in shipped_experiments()]
-    raise InputError(
-        f"no experiment '{reference}'{near(reference, names)} (shipped: {', '.join(names)};"
-        " or give the path of a YAML file)"
-    )
-
-
-def shipped_experiments() -> list[Path]:
-    """Return the files of the shipped experiments, in order of their names."""
-    return sorted(shipped("configs").glob("*.yaml"))
-
-
 def load_experiment(reference: str, settings: Sequence[str] = ()) -> Study:
     """Return a study whose every point has been checked, apart from the case that it names.
 
@@ -85,14 +70,18 @@ def load_experiment(reference: str, settings: Sequence[str] = ()) -> Study:
         settings: `key=value` options to put over it.
 
     Raises:
-        InputError: anything is wrong with file, options or sweep; all findings at once.
+        InputError: anything is wrong with files, options or sweep; all findings at once.
     """
-    document = yaml_lines.load(Path(shortest(find_experiment(reference))))
+    layers = read_layers(Path(shortest(find_experiment(reference))))
     options, findings = parse_settings(settings)
-    sources = Sources(document, tuple(options))
-    data, wrong = apply({} if document.data is None else document.data, options)
+    for option in options:
+        if option.path[0] == EXTENDS:
+            findings.append(f"{option.where}: only a file can say 'extends'")
+    options = [option for option in options if option.path[0] != EXTENDS]
+    sources = Sources(layers, tuple(options))
+    data, wrong = apply(layers.data, options)
     sweep = data.pop("sweep", None) if isinstance(data, dict) else None
-    experiment, problems = checked(Experiment, data)
+    experiment, problems = checked(Experiment, data, sources.folder)
     findings += wrong
     findings += [f"{sources.where(problem.paths)}: {problem.text}" for problem in problems]
     points = [] if experiment is None else [Point("", "", experiment)]
@@ -102,10 +91,11 @@ def load_experiment(reference: str, settings: Sequence[str] = ()) -> Study:
     findings += judge(points, sources)
     if findings:
         raise InputError(sorted(dict.fromkeys(findings), key=_line))
-    return Study(sources, tuple(points), bool(sweep))
+    assert experiment is not None
+    return Study(sources, tuple(points), bool(sweep), experiment)
 
 
-def _line(finding: str) -> int:
-    """Return the line that a finding names, so that they stand in the file's order."""
-    match = re.match(r"[^:]*:(\d+):", finding)
-    return int(match.group(1)) if match else 0
+def _line(finding: str) -> tuple[str, int]:
+    """Return the file and line that a finding names, so that they stand in their order."""
+    match = re.match(r"([^:]*):(\d+):", finding)
+    return (match.group(1), int(match.group(2))) if match else ("", 0)

@@ -1,25 +1,33 @@
 """Single settings put over an experiment: `--set key=value`, and the keys of a sweep point."""
 
 import copy
-import os
 import pathlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import yaml
 
-from tieline.problems import Path, value_at
+from tieline.experiment.layers import Layers, shortest
+from tieline.problems import Path
 from tieline.yaml_lines import Document
 
 
 @dataclass(frozen=True)
 class Override:
-    """One setting: `where` says in messages where it was given."""
+    """One setting: `where` says in messages where it was given.
+
+    Attributes:
+        path: the setting.
+        value: what it is.
+        where: the option, or file and line.
+        at: where the files hold its value, or nothing for an option.
+    """
 
     path: Path
     value: Any
     where: str
+    at: Path = ()
 
 
 def parse_settings(settings: Iterable[str]) -> tuple[list[Override], list[str]]:
@@ -88,29 +96,36 @@ def _no_way(data: Any, part: str | int, before: str) -> str:
 
 @dataclass(frozen=True)
 class Sources:
-    """Where an experiment's settings come from: its file, and the options put over it."""
+    """Where an experiment's settings come from: its files, and the options put over them."""
 
-    document: Document
+    layers: Layers
     options: tuple[Override, ...] = ()
+
+    @property
+    def document(self) -> Document:
+        """Return the experiment's own file."""
+        return self.layers.document
+
+    @property
+    def folder(self) -> pathlib.Path:
+        """Return the folder from which names of files count."""
+        return self.document.path.parent.resolve()
 
     def where(self, paths: Iterable[Path], overrides: Iterable[Override] = ()) -> str:
         """Return the place to look at first for the settings at some paths.
 
-        An option or override that gives one of them goes before the file, and what the file gives
-        before what it leaves out.
+        An option or override that gives one of them goes before the files, what a file gives
+        before what all leave out, and the experiment's own file before those that it extends.
         """
         paths = list(paths)
         given = [*self.options, *overrides]
         for path in paths:
             for override in given:
                 if related(override.path, path):
-                    return override.where
-        stated = [path for path in paths if value_at(self.document.data, path) is not None]
-        line = self.document.line([*stated, *paths][0])
-        return f"{shortest(self.document.path)}:{line}"
+                    inside = path[len(override.path) :]
+                    return self._line([(*override.at, *inside)]) if override.at else override.where
+        return self._line(paths)
 
-
-def shortest(path: pathlib.Path) -> str:
-    """Return a path relative to the working folder where it lies within it."""
-    relative = os.path.relpath(path)
-    return str(path) if relative.startswith("..") else relative
+    def _line(self, paths: Sequence[Path]) -> str:
+        document, line = self.layers.place(paths)
+        return f"{shortest(document.path)}:{line}"

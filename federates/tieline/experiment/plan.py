@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,22 +10,34 @@ from typing import Any
 
 from tieline.cosim.interfaces import lead_of
 from tieline.errors import InputError
+from tieline.experiment.guests import check_guests
 from tieline.experiment.load import Study
 from tieline.experiment.schema import Experiment
-from tieline.experiment.sites import Sites, Survey, survey
-from tieline.experiment.sweep import Point
+from tieline.experiment.sites import Sites, Survey, Surveyor
+from tieline.experiment.sweep import Gathered, Point
 from tieline.network.settings import PACKET_ENGINES
 from tieline.problems import near
 from tieline.resources import case_folder, shipped
 
+_GIVEN = re.compile(r" \(got [^()]*\)")
+"""What points may be wrong in, each in its own way, with one sentence for all."""
+
 
 @dataclass(frozen=True)
 class PlannedRun:
-    """One run: its point, the content of its run file, and hashes of the files that it reads."""
+    """One run.
+
+    Attributes:
+        point: its settings.
+        run: the content of its run file.
+        inputs: hashes of the files that it reads.
+        interconnection: what a drawing of it needs, or None.
+    """
 
     point: Point
     run: Mapping[str, Any]
     inputs: Mapping[str, str]
+    interconnection: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -45,26 +58,30 @@ def config_hash(experiment: Experiment) -> str:
     return hashlib.sha256(canonical_json(experiment.model_dump(mode="json")).encode()).hexdigest()
 
 
-def prepare(study: Study, survey: Survey = survey) -> Plan:
+def prepare(study: Study, survey: Survey | None = None) -> Plan:
     """Return the plan of a study, each of its points checked against its case and network.
 
     Args:
         study: a checked experiment.
-        survey: checks one point; points that differ in nothing it looks at are checked once.
+        survey: checks one point, in place of a `Surveyor`; points that differ in nothing it looks
+            at are checked once.
 
     Raises:
         InputError: every finding of every point.
     """
-    findings: list[str] = []
+    findings = Gathered()
     runs: list[PlannedRun] = []
     known: dict[str, Sites] = {}
+    look = Surveyor() if survey is None else survey
     for point in study.points:
         try:
-            runs.append(_planned(study, point, survey, known))
+            runs.append(_planned(study, point, look, known))
         except InputError as error:
-            findings += [study.located(finding, point) for finding in error.findings]
-    if findings:
-        raise InputError(dict.fromkeys(findings))
+            for finding in error.findings:
+                text = study.located(finding, point)
+                findings.add(_GIVEN.sub("", text), text, text != finding and bool(point.overrides))
+    if findings.lines():
+        raise InputError(findings.lines())
     return Plan(study, tuple(runs))
 
 
@@ -78,6 +95,7 @@ def _planned(study: Study, point: Point, survey: Survey, known: dict[str, Sites]
     if key not in known:
         known[key] = survey(experiment, folder, topology)
     sites = known[key]
+    check_guests(experiment, sites)
     inputs = {"case": _folder_hash(folder)}
     if topology is not None:
         inputs["topology"] = hashlib.sha256(topology.read_bytes()).hexdigest()
@@ -88,11 +106,14 @@ def _planned(study: Study, point: Point, survey: Survey, known: dict[str, Sites]
         inputs["trace"] = hashlib.sha256(trace.read_bytes()).hexdigest()
     run = _run_file(point, sites, folder, topology) | {"grid": parts["grid"]}
     run["network"]["empirical"] = parts["network"]["empirical"]
-    return PlannedRun(point, run, inputs)
+    if experiment.federation.guests:
+        run["guest_directory"] = str(beside.resolve())
+    return PlannedRun(point, run, inputs, sites.interconnection)
 
 
 def _run_file(point: Point, sites: Sites, folder: Path, topology: Path | None) -> dict[str, Any]:
     experiment = point.experiment
+    guests = experiment.federation.guests
     settings = experiment.model_dump(mode="json")
     digest = config_hash(experiment)
     return {
@@ -102,7 +123,8 @@ def _run_file(point: Point, sites: Sites, folder: Path, topology: Path | None) -
         "clock": {
             "rate_hz": experiment.rate_hz,
             "intervals": experiment.intervals,
-            "lead": lead_of(experiment.rate_hz, sites.lookahead_ns),
+            # A guest is heard at every instant of the clock, not once a stride.
+            "lead": 0 if guests else lead_of(experiment.rate_hz, sites.lookahead_ns),
         },
         "federation": settings["federation"],
         "case": str(folder),

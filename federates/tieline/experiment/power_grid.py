@@ -1,13 +1,13 @@
 """Hands a case's tables to the generators of topologies, which know nothing of the grid's code."""
 
-from tieline.grid.case import load_case
+from tieline.grid.case import Case, load_case
 from tieline.grid.check import controllers
 from tieline.network.topologies.power_grid import Branch, Bus, PowerGrid
 from tieline.resources import case_folder
 
 
 def power_grid(case: str) -> PowerGrid:
-    """Return what a communication network needs to know of a case.
+    """Return what a communication network needs to know of a shipped case, or one in a folder.
 
     Args:
         case: a shipped name, or the path of a case folder.
@@ -15,7 +15,11 @@ def power_grid(case: str) -> PowerGrid:
     Raises:
         InputError: there is no such case, or its tables are faulty.
     """
-    found = load_case(case_folder(case))
+    return power_grid_of(load_case(case_folder(case)))
+
+
+def power_grid_of(found: Case) -> PowerGrid:
+    """Return what a communication network needs to know of a case that has been read."""
     buses, branches = found.buses, found.branches
     numbers = buses.number.tolist()
     return PowerGrid(

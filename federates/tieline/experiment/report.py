@@ -1,4 +1,4 @@
-"""Makes a result presentable: the closing table, its CSV and the plots; reads the folder only."""
+"""Makes a result presentable: closing table, CSV, plots and page; reads the folder only."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,13 +9,18 @@ from rich.table import Table
 
 from tieline.errors import InputError
 from tieline.experiment.overrides import shortest
-from tieline.experiment.plots import draw
+from tieline.experiment.plots import draw, drawn_unit
 from tieline.experiment.results import SUMMARY, Run, read_manifest, read_runs
 from tieline.experiment.table import FIELDS, Summary, shown, write_csv
+from tieline.report import write_pages
+from tieline.report.network_figures import draw as draw_network
+from tieline.report.network_figures import has_series
 
 
 def report(folder: Path, console: Console) -> None:
-    """Write `table.csv` and `plots/` into a result folder, and print the table and their paths.
+    """Write `table.csv`, `plots/` and `report.html`, and print the table and their paths.
+
+    A single run with series of its network has figures of them too.
 
     Raises:
         InputError: the folder is no result, or none of its runs is complete.
@@ -27,6 +32,9 @@ def report(folder: Path, console: Console) -> None:
     summaries = [run.summary() for run in runs]
     write_csv(folder / "table.csv", summaries)
     plots = draw(folder / "plots", runs)
+    if manifest["kind"] == "run" and has_series(folder):
+        plots += draw_network(folder)
+    page = write_pages(folder, drawn_unit(runs[0]))
     console.print(closing_table(summaries))
     for summary in summaries:
         if summary["ending"]:
@@ -37,6 +45,7 @@ def report(folder: Path, console: Console) -> None:
         _say(console, f"incomplete: {manifest['reason']}")
     _say(console, f"summary  {shortest(_summary_file(folder, runs))}")
     _say(console, f"table    {shortest(folder / 'table.csv')}")
+    _say(console, f"report   {shortest(page)}")
     _say(console, f"plots    {', '.join(shortest(path) for path in plots)}")
 
 

@@ -17,6 +17,7 @@ from tieline.tables import column_names, read_table
 MANIFEST = "manifest.json"
 SUMMARY = "summary.json"
 POINTS = "points"
+MAP = "map.json"
 FORMAT = "tieline-result/1"
 
 
@@ -46,6 +47,11 @@ class Run:
     def told(self) -> Mapping[str, Any]:
         """Return the run file that the federates were given."""
         return read_json(self.folder / "run.json")
+
+    def map(self) -> Mapping[str, Any] | None:
+        """Return stations, lines and links with their places; None if the run wrote none."""
+        path = self.folder / MAP
+        return read_json(path) if path.is_file() else None
 
     def summary(self) -> Mapping[str, Any]:
         """Return the summary."""

@@ -17,7 +17,15 @@ from tieline.experiment.manifest import (
     write_json,
 )
 from tieline.experiment.plan import Plan, PlannedRun
-from tieline.experiment.results import POINTS, SUMMARY, Run, is_result, read_manifest, read_runs
+from tieline.experiment.results import (
+    MAP,
+    POINTS,
+    SUMMARY,
+    Run,
+    is_result,
+    read_manifest,
+    read_runs,
+)
 from tieline.experiment.summary import summarise
 from tieline.experiment.sweep import Point
 from tieline.experiment.watch import Progress
@@ -123,6 +131,10 @@ def _run_one(
     on_progress: Callable[[Point, float], None] | None,
 ) -> None:
     write_json(folder / "run.json", planned.run)
+    if planned.interconnection is not None:
+        from tieline.experiment.interconnection import placed
+
+        write_json(folder / MAP, placed(planned.interconnection))
     save_manifest(folder, run_manifest(planned, {}, UNDER_WAY))
 
     def report(progress: Progress) -> None:

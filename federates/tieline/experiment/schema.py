@@ -1,5 +1,6 @@
 """What an experiment file may say, and what must hold between its parts."""
 
+import pathlib
 from collections.abc import Iterator
 from typing import Annotated
 
@@ -7,9 +8,14 @@ from pydantic import BaseModel, ConfigDict, Field, StrictInt
 
 from tieline.cosim.interfaces import FederationSettings
 from tieline.grid.settings import GridSettings
+from tieline.network.findings import Findings
+from tieline.network.schema import EventEntry
 from tieline.network.settings import PACKET_ENGINES, NetworkSettings
+from tieline.network.traffic import TRAFFIC
 from tieline.problems import Path, Problem
+from tieline.units import Unit
 from tieline.wams.settings import WamsSettings
+from tieline.yaml_lines import Document
 
 CONTINUOUS_RATE_HZ = 60
 """Meetings of the federates a second when the average is formed at every integration step."""
@@ -25,11 +31,25 @@ class Experiment(BaseModel):
     )
     question: str = Field(min_length=1, description="the question it answers, in one sentence")
     case: str = Field("miniwecc", min_length=1, description="a shipped case, or a case folder")
-    seed: StrictInt = Field(1, ge=0, lt=2**63, description="seed of every named random stream")
-    grid: GridSettings = GridSettings()  # type: ignore[call-arg]
-    wams: WamsSettings = WamsSettings()  # type: ignore[call-arg]
-    network: NetworkSettings = NetworkSettings()  # type: ignore[call-arg]
-    federation: FederationSettings = FederationSettings()  # type: ignore[call-arg]
+    seed: Annotated[StrictInt, Unit("number")] = Field(
+        1, ge=0, lt=2**63, description="seed of every named random stream"
+    )
+    grid: GridSettings = Field(
+        GridSettings(),  # type: ignore[call-arg]
+        description="duration, integration, stabilisers, loads and disturbances",
+    )
+    wams: WamsSettings = Field(
+        WamsSettings(),  # type: ignore[call-arg]
+        description="the phasor measurements, and the average made of them",
+    )
+    network: NetworkSettings = Field(
+        NetworkSettings(),  # type: ignore[call-arg]
+        description="what carries the measurements, and what the experiment changes of it",
+    )
+    federation: FederationSettings = Field(
+        FederationSettings(),  # type: ignore[call-arg]
+        description="how the two federates meet",
+    )
 
     @property
     def rate_hz(self) -> int:
@@ -43,13 +63,13 @@ class Experiment(BaseModel):
         return round(self.grid.duration * self.rate_hz)
 
 
-FIXED: frozenset[str] = frozenset({"name", "question", "sweep"})
+FIXED: frozenset[str] = frozenset({"name", "question", "extends", "sweep"})
 """Keys that belong to the whole experiment: no sweep point can change them."""
 
 
 def contradictions(experiment: Experiment) -> list[Problem]:
     """Return what does not fit together in an experiment whose single values are right."""
-    parts = (_timing, _average, _engine, _delay_line)
+    parts = (_timing, _average, _engine, _delay_line, _words)
     return [problem for part in parts for problem in part(experiment)]
 
 
@@ -59,6 +79,7 @@ def without_effect(experiment: Experiment) -> list[Problem]:
     readers = {
         "delay": ("constant", "helics-filters"),
         "mean_delay": PACKET_ENGINES,
+        "jitter": PACKET_ENGINES,
         "loss": (*PACKET_ENGINES, "empirical", "helics-filters"),
         "empirical": ("empirical",),
     }
@@ -71,6 +92,23 @@ def without_effect(experiment: Experiment) -> list[Problem]:
         for key, engines in readers.items()
         if getattr(network, key) is not None and network.engine not in engines
     ]
+
+
+def _words(experiment: Experiment) -> Iterator[Problem]:
+    """Yield what is wrong with traffic and events of the network in themselves.
+
+    Whether the nodes that they name exist is for the topology to say, and where a trace's file is.
+    """
+    given = {"traffic": experiment.network.traffic, "events": experiment.network.events}
+    for section, entries in given.items():
+        for i, entry in enumerate(entries):
+            findings = Findings(Document(pathlib.Path(), {section: list(entries)}, {}), "network.")
+            if section == "events":
+                findings.entry(entry, (section, i), EventEntry)
+            elif entry.get("kind") != "trace":
+                findings.tagged(entry, (section, i), "kind", TRAFFIC)
+            for line in findings.lines():
+                yield Problem((("network", section, i),), line)
 
 
 def _timing(experiment: Experiment) -> Iterator[Problem]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ from tieline.experiment.schema import Experiment
 
 if TYPE_CHECKING:
     from tieline.grid.case import Case
+    from tieline.network.spec import NetworkSpec
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,7 @@ class Sites:
         plot_unit: the unit whose voltage is drawn, or None.
         lookahead_ns: least time from a measurement until its frame does anything; None without
             frames.
+        interconnection: what a drawing of it needs, as `interconnection` returns it, or None.
     """
 
     sensors: tuple[int, ...]
@@ -32,6 +35,7 @@ class Sites:
     tie_mode: Mapping[str, Any] | None = None
     plot_unit: str | None = None
     lookahead_ns: int | None = 0
+    interconnection: Mapping[str, Any] | None = None
 
     def sources(self) -> list[dict[str, Any]]:
         """Return the PMUs as the run file lists them."""
@@ -52,22 +56,66 @@ Survey = Callable[[Experiment, Path, Path | None], Sites]
 """Checks an experiment against a case folder and a topology file (or None)."""
 
 
-def survey(experiment: Experiment, folder: Path, topology: Path | None) -> Sites:
-    """Return the sites of an experiment, after every check against case and network.
+Describe = Callable[["NetworkSpec | None"], Mapping[str, Any]]
+"""Returns what a drawing of a case with a network needs."""
 
-    Args:
-        experiment: checked by itself.
-        folder: the case's.
-        topology: the network's file, or None when the engine needs none.
 
-    Raises:
-        InputError: the case is malformed, the experiment names something that it lacks, its power
-            flow diverges, or the network does not connect what it must.
-    """
+class Surveyor:
+    """Checks experiments one after another; what the grid alone decides is looked at once."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, tuple[Sites, tuple[str, ...], Describe]] = {}
+
+    def __call__(self, experiment: Experiment, folder: Path, topology: Path | None) -> Sites:
+        """Return the sites of an experiment, after every check against case and network.
+
+        Args:
+            experiment: checked by itself.
+            folder: the case's.
+            topology: the network's file, or None when the engine needs none.
+
+        Raises:
+            InputError: the case is malformed, the experiment names something that it lacks, its
+                power flow diverges, or the network does not connect what it must.
+        """
+        from tieline.network.topology import network_spec
+
+        sites, of_grid, describe = self._of_grid(experiment, folder)
+        findings = list(of_grid)
+        lookahead_ns, spec = None, None
+        if sites.sensors and sites.controllers:
+            sources, destinations = sites.sources(), sites.destinations()
+            try:
+                spec = network_spec(experiment.network, topology, sources, destinations)
+                lookahead_ns = spec.lookahead_ns
+            except InputError as error:
+                findings += error.findings
+        if findings:
+            raise InputError(findings)
+        has_frames = experiment.wams.reporting != "continuous"
+        return replace(
+            sites,
+            lookahead_ns=lookahead_ns if has_frames else None,
+            interconnection=describe(None if topology is None else spec),
+        )
+
+    def _of_grid(
+        self, experiment: Experiment, folder: Path
+    ) -> tuple[Sites, tuple[str, ...], Describe]:
+        parts = experiment.model_dump_json(include={"grid", "wams"})
+        key = f"{folder} {parts}"
+        if key not in self._known:
+            self._known[key] = _grid_sites(experiment, folder)
+        return self._known[key]
+
+
+def _grid_sites(experiment: Experiment, folder: Path) -> tuple[Sites, tuple[str, ...], Describe]:
+    """Return the sites as the case has them, what is wrong with what is asked, and what to draw."""
     # The case brings the compiled models with it, which `tieline list` should not wait for.
+    from tieline.experiment.interconnection import interconnection
+    from tieline.experiment.power_grid import power_grid_of
     from tieline.grid.case import load_case
     from tieline.grid.models.registry import use_file
-    from tieline.network.topology import network_spec
 
     use_file("pss", experiment.grid.pss.file)
     case = load_case(folder)
@@ -80,18 +128,9 @@ def survey(experiment: Experiment, folder: Path, topology: Path | None) -> Sites
         None if tie_mode is None else tie_mode.model_dump(mode="json"),
         case.base.plot_unit,
     )
-    lookahead_ns = None
-    if sensors and controllers:
-        sources, destinations = sites.sources(), sites.destinations()
-        try:
-            spec = network_spec(experiment.network, topology, sources, destinations)
-            lookahead_ns = spec.lookahead_ns
-        except InputError as error:
-            findings += error.findings
-    if findings:
-        raise InputError(findings)
-    has_frames = experiment.wams.reporting != "continuous"
-    return replace(sites, lookahead_ns=lookahead_ns if has_frames else None)
+    buses = case.buses.number[case.unit_bus].tolist()
+    units = list(zip(case.units, buses, strict=True))
+    return sites, tuple(findings), partial(interconnection, power_grid_of(case), units)
 
 
 def _stations(

@@ -5,11 +5,12 @@ import json
 import os
 import signal
 import subprocess
+import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import tieline
 from tieline.cosim.process import LAUNCHER_VARIABLE
@@ -28,6 +29,22 @@ class ProcessUse:
     exit_code: int
     cpu_s: float
     peak_bytes: int
+
+
+class Process(Protocol):
+    """What ends and is heard: a child, or a process of another host."""
+
+    def poll(self) -> bool:
+        """Return whether it has ended."""
+
+    def read(self) -> Iterator[dict[str, Any]]:
+        """Yield what it says."""
+
+    def terminate(self) -> None:
+        """Ask it to save and end."""
+
+    def kill(self) -> None:
+        """End it."""
 
 
 class Log:
@@ -62,14 +79,19 @@ class Child:
         name: what the run calls it.
         command: the program and its arguments.
         log: where its standard error, and whatever else it says, is kept.
+        directory: where it runs; None for here.
 
     Attributes:
         exit_code: None while it runs; negative for the signal that killed it.
+        reason: always None; a process of another host may have one.
     """
 
-    def __init__(self, name: str, command: Sequence[str], log: Path) -> None:
+    def __init__(
+        self, name: str, command: Sequence[str], log: Path, directory: Path | None = None
+    ) -> None:
         self.name = name
         self.exit_code: int | None = None
+        self.reason: str | None = None
         self.use: ProcessUse | None = None
         self._peak_bytes = 0
         self._process = subprocess.Popen(
@@ -78,6 +100,7 @@ class Child:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             env=_environment(),
+            cwd=directory,
             start_new_session=True,
         )
         self.log = Log(log)
@@ -176,7 +199,7 @@ class Child:
             yield from lines
 
 
-def end_all(children: Sequence[Child], grace_s: float) -> None:
+def end_all(children: Sequence[Process], grace_s: float) -> None:
     """End every child: each may save for `grace_s` after SIGTERM, then its group is killed."""
     limit = time.monotonic() + grace_s
     try:
@@ -190,25 +213,34 @@ def end_all(children: Sequence[Child], grace_s: float) -> None:
             child.kill()
 
 
-def drain(children: Sequence[Child]) -> None:
+def drain(children: Sequence[Process]) -> None:
     """Read what the children say, so that none waits for a full pipe; only logs keep it."""
     for child in children:
         for _ in child.read():
             continue
 
 
-def _environment() -> dict[str, str]:
-    environment = dict(os.environ)
+def shared_environment(before: Mapping[str, str]) -> dict[str, str]:
+    """Return the variables that every process of a run needs, given those of the launcher."""
     # The children run this very code, wherever it was imported from.
     source = str(Path(tieline.__file__).resolve().parent.parent)
-    others = environment.get("PYTHONPATH")
-    environment["PYTHONPATH"] = source if not others else f"{source}{os.pathsep}{others}"
-    environment[LAUNCHER_VARIABLE] = str(os.getpid())
-    environment.setdefault("PYTHONFAULTHANDLER", "1")
+    others = before.get("PYTHONPATH")
+    # A guest's `python` or `helics_recorder` is this environment's, activated or not.
+    programs = str(Path(sys.executable).parent)
+    shared = {
+        "PYTHONPATH": source if not others else f"{source}{os.pathsep}{others}",
+        "PATH": f"{programs}{os.pathsep}{before.get('PATH', os.defpath)}",
+        "PYTHONFAULTHANDLER": before.get("PYTHONFAULTHANDLER", "1"),
+    }
     # The matrices are small: threads of a linear algebra library cost here more than they give.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        environment.setdefault(variable, "1")
-    return environment
+        shared[variable] = before.get(variable, "1")
+    return shared
+
+
+def _environment() -> dict[str, str]:
+    own = {LAUNCHER_VARIABLE: str(os.getpid())}
+    return dict(os.environ) | shared_environment(os.environ) | own
 
 
 def _peak_bytes(pid: int) -> int:

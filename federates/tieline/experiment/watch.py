@@ -13,6 +13,7 @@ _LONGEST_PASS_S = 0.5
 _LEAST_CPU_S = 0.05
 _DONE = ("finished", "failed")
 _STATES = ("starting", "opening", "joining", "running", "finishing", *_DONE)
+_JOINING = _STATES.index("joining")
 
 
 @dataclass(frozen=True)
@@ -36,9 +37,10 @@ class Suspect:
 
 
 class Process(Protocol):
-    """What is looked at of a child process."""
+    """What is looked at of a process; `reason` may say more than its exit code does."""
 
     exit_code: int | None
+    reason: str | None
 
     def is_stopped(self) -> bool:
         """Return whether a signal holds it."""
@@ -51,13 +53,26 @@ class Watch:
     without either (opening its participant, its first interval, when code is compiled, and
     writing its results) its processor time counts, too.
 
+    Args:
+        settings: of the federation.
+        members: the federates that it hears.
+        bystanders: processes that may end before the run does.
+
     Attributes:
         silence_s: wall time since any federate came further, s.
     """
 
-    def __init__(self, settings: FederationSettings) -> None:
+    def __init__(
+        self,
+        settings: FederationSettings,
+        members: Sequence[str] = FEDERATES,
+        bystanders: Sequence[str] = (),
+    ) -> None:
         self.silence_s = 0.0
+        self._members = tuple(members)
         self._settings = settings
+        self._guests = tuple(guest.name for guest in settings.guests)
+        self._bystanders = (*self._guests, *bystanders)
         self._last: dict[str, dict[str, Any]] = {}
         self._cpu_s: dict[str, float] = {}
 
@@ -69,7 +84,7 @@ class Watch:
         if _place(message) != _place(before) or self._works(name, message):
             self._cpu_s[name] = _cpu_s(message)
             self.silence_s = 0.0
-        if name not in FEDERATES:
+        if name not in self._members:
             return None
         return Progress(name, message["state"], message["k"], message["granted_ns"])
 
@@ -79,15 +94,19 @@ class Watch:
 
     def granted_ns(self) -> dict[str, int]:
         """Return the last time granted to each federate, -1 for none."""
-        return {name: self._last.get(name, {}).get("granted_ns", -1) for name in FEDERATES}
+        return {name: self._last.get(name, {}).get("granted_ns", -1) for name in self._members}
 
     def is_running(self) -> bool:
         """Return whether every federate has joined."""
-        return all(self._state(name) in ("running", "finishing", *_DONE) for name in FEDERATES)
+        return all(self._state(name) in ("running", "finishing", *_DONE) for name in self._members)
+
+    def is_opened(self) -> bool:
+        """Return whether every federate is ready to join."""
+        return all(_STATES.index(self._state(name)) >= _JOINING for name in self._members)
 
     def is_finished(self) -> bool:
         """Return whether every federate has reached its end."""
-        return all(self._state(name) == "finished" for name in FEDERATES)
+        return all(self._state(name) == "finished" for name in self._members)
 
     def suspect(self, processes: Mapping[str, Process]) -> Suspect | None:
         """Return who is at fault so far, the surest sign first."""
@@ -97,7 +116,7 @@ class Watch:
             or self._stopped(processes)
             or self._ended_too_soon(processes)
             or self._failed_by_others()
-            or self._silent()
+            or self._silent(processes)
         )
 
     def _state(self, name: str) -> str:
@@ -108,7 +127,7 @@ class Watch:
         return may_be_long and _cpu_s(message) - self._cpu_s[name] >= _LEAST_CPU_S
 
     def _failed_by_itself(self) -> Suspect | None:
-        for name in FEDERATES:
+        for name in self._members:
             if self._state(name) == "failed" and self._last[name]["fault"] == "own":
                 return self._by_own_word(name, is_certain=True)
         return None
@@ -116,13 +135,14 @@ class Watch:
     def _dead(self, processes: Mapping[str, Process]) -> Suspect | None:
         for name, process in processes.items():
             if process.exit_code and not self._has_failed(name):
-                reason = f"died: {_manner(process.exit_code)}{self._when(name)}"
+                manner = process.reason or f"died: {_manner(process.exit_code)}"
+                reason = f"{manner}{self._when(name)}"
                 return Suspect(name, reason, CosimError.exit_code)
         return None
 
     def _stopped(self, processes: Mapping[str, Process]) -> Suspect | None:
         limit_s, _ = self._limit()
-        is_due = self.silence_s > limit_s or any(self._has_failed(name) for name in FEDERATES)
+        is_due = self.silence_s > limit_s or any(self._has_failed(name) for name in self._members)
         for name, process in processes.items():
             if is_due and process.is_stopped():
                 reason = f"hung: its process is stopped by a signal{self._when(name)}"
@@ -131,16 +151,18 @@ class Watch:
 
     def _ended_too_soon(self, processes: Mapping[str, Process]) -> Suspect | None:
         for name, process in processes.items():
+            if name in self._bystanders:
+                continue
             # A broker ends as soon as the federates have left, while they write their results.
-            good = _DONE if name in FEDERATES else ("finishing", *_DONE)
-            states = [self._state(member) for member in _members(name)]
+            good = _DONE if name in self._members else ("finishing", *_DONE)
+            states = [self._state(member) for member in self._whose(name)]
             if process.exit_code is not None and any(state not in good for state in states):
                 reason = f"ended before the run did{self._when(name)}"
-                return Suspect(name, reason, CosimError.exit_code, is_certain=name in FEDERATES)
+                return Suspect(name, reason, CosimError.exit_code, is_certain=name in self._members)
         return None
 
     def _failed_by_others(self) -> Suspect | None:
-        for name in FEDERATES:
+        for name in self._members:
             if self._state(name) == "failed":
                 return self._by_own_word(name, is_certain=False)
         return None
@@ -150,11 +172,18 @@ class Watch:
         reason = f"{word['reason']}{self._when(name)}"
         return Suspect(name, reason, int(word["exit_code"]), is_certain)
 
-    def _silent(self) -> Suspect | None:
+    def _silent(self, processes: Mapping[str, Process]) -> Suspect | None:
         limit_s, what = self._limit()
         if self.silence_s <= limit_s or self.is_finished():
             return None
-        name = min(FEDERATES, key=self._blame)
+        guests = [
+            name for name in self._guests if name in processes and processes[name].exit_code is None
+        ]
+        if guests and self._is_guests_turn():
+            name = " or ".join(guests)
+            reason = f"hung: {what} for {limit_s:g} s of wall time, and the others wait"
+            return Suspect(name, reason, CosimError.exit_code)
+        name = min(self._members, key=self._blame)
         reason = f"hung: {what} for {limit_s:g} s of wall time{self._when(name)}"
         return Suspect(name, reason, CosimError.exit_code)
 
@@ -163,8 +192,15 @@ class Watch:
             return self._settings.hang_timeout, "no federate was granted anything"
         return self._settings.start_timeout, "it has not joined the federation"
 
+    def _is_guests_turn(self) -> bool:
+        """Return whether the federates have all asked for a grant, or all wait for the start."""
+        words = [self._last.get(name, {}) for name in self._members]
+        if self.is_running():
+            return all(word.get("waits") for word in words)
+        return all(word.get("state") == "joining" for word in words)
+
     def _has_failed(self, name: str) -> bool:
-        return any(self._state(member) == "failed" for member in _members(name))
+        return any(self._state(member) == "failed" for member in self._whose(name))
 
     def _blame(self, name: str) -> tuple[int, bool, int]:
         """Return a key, least for the one to name: the furthest behind, then whose turn it is."""
@@ -175,8 +211,12 @@ class Watch:
     def _when(self, name: str) -> str:
         granted_ns = self._last.get(name, {}).get("granted_ns", -1)
         if granted_ns < 0:
-            return f" (while {self._state(name)})" if name in FEDERATES else ""
+            return f" (while {self._state(name)})" if name in self._members else ""
         return f" (last granted {ns_to_seconds(granted_ns):.6f} s)"
+
+    def _whose(self, name: str) -> Sequence[str]:
+        """Return the federates whose state speaks for a process."""
+        return (name,) if name in self._members else self._members
 
 
 def _place(message: Mapping[str, Any]) -> tuple[Any, Any]:
@@ -185,10 +225,6 @@ def _place(message: Mapping[str, Any]) -> tuple[Any, Any]:
 
 def _cpu_s(message: Mapping[str, Any]) -> float:
     return float(message.get("cpu_s", 0.0))
-
-
-def _members(name: str) -> Sequence[str]:
-    return (name,) if name in FEDERATES else FEDERATES
 
 
 def _manner(exit_code: int) -> str:

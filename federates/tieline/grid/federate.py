@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tieline.cosim.guests import Command, GuestSettings, unit_owners
 from tieline.cosim.interfaces import GRID, Clock, DeliveryBundle, FrameBundle
-from tieline.errors import TimeContractBroken
+from tieline.errors import CosimError, TimeContractBroken
 from tieline.grid.average import continuous_average, sensor_weights
 from tieline.grid.case import Case, load_case
 from tieline.grid.check import sensor_buses
@@ -17,6 +18,7 @@ from tieline.grid.devices import with_pss
 from tieline.grid.events import plan_events
 from tieline.grid.load_mix import with_load_mix
 from tieline.grid.models.registry import use_file
+from tieline.grid.modulation import Modulation
 from tieline.grid.plan import HELD, Average
 from tieline.grid.powerflow import solve_power_flow
 from tieline.grid.recorder import Recorder
@@ -39,6 +41,7 @@ class GridRun:
     Attributes:
         fitted: (controllers,) row of the unit that each controller belongs to.
         delay_ns: delay of the continuously formed average; None when frames carry it.
+        owners: the guest that may move a unit's stabiliser signal, by unit.
     """
 
     clock: Clock
@@ -47,6 +50,7 @@ class GridRun:
     wams: WamsSettings
     fitted: Integers
     delay_ns: int | None
+    owners: Mapping[str, GuestSettings]
 
     @classmethod
     def read(cls, run: Mapping[str, Any]) -> "GridRun":
@@ -69,6 +73,7 @@ class GridRun:
             wams=wams,
             fitted=np.array(fitted, np.int64),
             delay_ns=seconds_to_ns(run["network"]["delay"] or 0.0) if is_continuous else None,
+            owners=unit_owners(run),
         )
 
 
@@ -111,6 +116,7 @@ class GridFederate:
         is_fitted = np.zeros(len(case.units))
         is_fitted[run.fitted] = 1.0
         self._recorder = Recorder(folder / "grid.parquet", self._grid, sensors, is_fitted)
+        self._modulation = Modulation(self._grid, run.owners) if run.owners else None
 
     def start(self) -> list[bytes]:
         """Return the frames measured at t_0."""
@@ -143,6 +149,16 @@ class GridFederate:
             if tick % self._per_record == 0 and tick < last:
                 self._record()
         return self._frames(last)
+
+    def modulate(self, k: int, commands: Sequence[Command]) -> None:
+        """Let stabiliser signals of guests act from t_k on.
+
+        Raises:
+            CosimError: the experiment has no guest that may send any.
+        """
+        if self._modulation is None:
+            raise CosimError("a stabiliser signal came, but no guest has a unit")
+        self._modulation.apply(tick_ns(k, self._run.clock.rate_hz), commands)
 
     def finish(self) -> None:
         """Record the last instant and complete the tables."""
@@ -179,6 +195,8 @@ class GridFederate:
             "is_ending": np.array(is_ending, np.int64),
         }
         write_table(self._folder / "events.parquet", columns, data)
+        if self._modulation is not None:
+            self._modulation.write(self._folder)
 
     def _record_ticks(self, first: int, last: int) -> range:
         start = -(-first // self._per_record) * self._per_record

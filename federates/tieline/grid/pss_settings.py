@@ -1,14 +1,19 @@
 """What an experiment says about the power system stabilisers."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, ValidationInfo, field_validator
 
 from tieline.grid.plugins import installed_keys, shipped_keys
 from tieline.grid.tables import near
+from tieline.units import Unit
 
 ALIASES = {"standard": "delta_omega", "generalized": "generalized_delta_omega"}
 NONE, OF_THE_CASE = "none", "case"
+
+PerUnit = Annotated[StrictFloat, Unit("pu")]
+OwnUnit = Annotated[StrictFloat, Unit("the model's")]
+"""A parameter's value; unit and bounds are those that its model declares (`tieline models`)."""
 
 
 class PssSettings(BaseModel):
@@ -28,29 +33,33 @@ class PssSettings(BaseModel):
     )
     model: str = Field(
         "generalized",
+        min_length=1,
         description="none; case, each unit's own of pss.csv; standard or generalized, the "
         "delta-omega PSS without and with beta1 and beta2; or any other model by its name",
     )
-    gain: StrictFloat | None = Field(
-        None, ge=0, description="gain K, pu on the machine's base; none takes the case's own"
+    gain: PerUnit | None = Field(
+        None,
+        ge=0,
+        le=1e6,
+        description="gain K, on the machine's base; none takes the case's own",
     )
-    beta1: StrictFloat | None = Field(
+    beta1: PerUnit | None = Field(
         None,
         ge=0,
         le=1,
         description="share of the speed against the average; none takes the case's own, or 1",
     )
-    beta2: StrictFloat | None = Field(
+    beta2: PerUnit | None = Field(
         None,
         ge=0,
         le=1,
         description="share of the average against synchronous; none takes the case's own, or 1",
     )
-    parameters: dict[str, StrictFloat] = Field(
-        default_factory=dict, description="parameters of every unit's model by symbol, as {T1: 0.2}"
+    parameters: dict[str, OwnUnit] = Field(
+        {}, description="parameters of every unit's model by symbol, as {T1: 0.2}"
     )
-    tuning: dict[str, dict[str, StrictFloat]] = Field(
-        default_factory=dict, description="parameters of single units, as {G3: {K: 5, T1: 0.2}}"
+    tuning: dict[str, dict[str, OwnUnit]] = Field(
+        {}, description="parameters of single units, as {G3: {K: 5, T1: 0.2}}"
     )
     average: Literal["sensors", "rotors"] = Field(
         "sensors",
@@ -64,6 +73,8 @@ class PssSettings(BaseModel):
     @classmethod
     def _is_known(cls, value: str, info: ValidationInfo) -> str:
         """Refuse an unknown name at once, unless a file may bring it."""
+        if value in (NONE, OF_THE_CASE, *ALIASES):
+            return value
         known = [NONE, *ALIASES, OF_THE_CASE, *shipped_keys("pss"), *installed_keys("pss")]
         if info.data.get("file") is None and value not in known:
             raise ValueError(

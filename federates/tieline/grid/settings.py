@@ -2,11 +2,11 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, model_validator
+from pydantic import BaseModel, ConfigDict, Field, StrictFloat, model_validator
 
 from tieline.grid.event_settings import Event
 from tieline.grid.pss_settings import PssSettings
-from tieline.units import Seconds
+from tieline.units import PerSecond, Seconds, Share, Unit
 
 STEEPEST_LOAD = 20.0
 """Largest answer of a load to frequency, pu/pu; measured ones are far below."""
@@ -16,8 +16,8 @@ class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-Share = Annotated[StrictFloat, Field(ge=0, le=1)]
-Slope = Annotated[StrictFloat, Field(ge=-STEEPEST_LOAD, le=STEEPEST_LOAD)]
+Part = Annotated[Share, Field(ge=0, le=1)]
+Slope = Annotated[StrictFloat, Field(ge=-STEEPEST_LOAD, le=STEEPEST_LOAD), Unit("pu/pu")]
 
 
 class LoadSettings(_Strict):
@@ -26,12 +26,18 @@ class LoadSettings(_Strict):
     What is neither constant power nor constant current is constant impedance.
     """
 
-    p_constant_power: Share = Field(0.0, description="share of active power that is constant power")
-    p_constant_current: Share = Field(0.0, description="share of it that is constant current")
-    q_constant_power: Share = Field(0.0, description="share of reactive power, constant power")
-    q_constant_current: Share = Field(0.0, description="share of it that is constant current")
-    p_frequency: Slope = Field(0.0, description="active power's answer to frequency, pu/pu")
-    q_frequency: Slope = Field(0.0, description="reactive power's answer to frequency, pu/pu")
+    p_constant_power: Part = Field(0.0, description="share of active power that is constant power")
+    p_constant_current: Part = Field(
+        0.0, description="share of active power that is constant current"
+    )
+    q_constant_power: Part = Field(
+        0.0, description="share of reactive power that is constant power"
+    )
+    q_constant_current: Part = Field(
+        0.0, description="share of reactive power that is constant current"
+    )
+    p_frequency: Slope = Field(0.0, description="answer of active power to frequency")
+    q_frequency: Slope = Field(0.0, description="answer of reactive power to frequency")
 
     @model_validator(mode="after")
     def _leave_room(self) -> Self:
@@ -45,7 +51,7 @@ class LoadSettings(_Strict):
 class GridSettings(_Strict):
     """Duration, integration and disturbances."""
 
-    duration: Seconds = Field(41.0, gt=0, le=86_400, description="simulated time, s")
+    duration: Seconds = Field(41.0, gt=0, le=86_400, description="simulated time")
     method: Literal["rk4", "heun", "trapezoid"] = Field(
         "rk4",
         description=(
@@ -53,10 +59,15 @@ class GridSettings(_Strict):
             "long as 1/60 s"
         ),
     )
-    steps_per_second: StrictInt = Field(
+    steps_per_second: PerSecond = Field(
         240, gt=0, le=100_000, description="integration steps a second"
     )
-    records_per_second: StrictInt = Field(60, gt=0, description="recorded instants a second")
-    pss: PssSettings = PssSettings()  # type: ignore[call-arg]
+    records_per_second: PerSecond = Field(
+        60, gt=0, le=100_000, description="recorded instants a second, a divisor of the steps"
+    )
+    pss: PssSettings = Field(
+        PssSettings(),  # type: ignore[call-arg]
+        description="the stabilisers and their tuning",
+    )
     loads: LoadSettings | None = Field(None, description="mix of every load; none keeps the case's")
-    events: list[Event] = Field(default_factory=list, description="disturbances, in any order")
+    events: list[Event] = Field([], description="disturbances, in any order")

@@ -32,6 +32,8 @@ from tieline.grid.topology import (
 )
 from tieline.grid.wbar import hear, late_average, no_averages
 
+VREF = SIGNALS.index("Vref")
+
 LOOKS_PER_SECOND = 60
 """How often it is checked that every unit is still within bounds."""
 
@@ -104,6 +106,14 @@ class Grid:
         """
         self._averages = self._averages._replace(due=due, told=told)
         self._hear()
+
+    def modulate(self, unit: int, change_pu: float) -> None:
+        """Add to what a unit's exciter takes its terminal voltage for too low by, from now on.
+
+        Every exciter adds the stabiliser's signal to its reference, so the reference carries it.
+        """
+        self._work.signals[VREF, unit] += change_pu
+        self._is_current = False
 
     def _hear(self) -> None:
         if np.any(self._averages.due == self.tick):

@@ -185,7 +185,7 @@ class Entries:
             seconds_to_ns(entry.propagation),
             queue,
             loss_of(given["loss"]) if loss is None else Bernoulli(loss) if loss else None,
-            jitter_of(given["jitter"]),
+            jitter_of(given["jitter"] if self._settings.jitter is None else self._settings.jitter),
             overhead_of(given),
             is_half,
             given["mtu"] or ETHERNET_MTU,

@@ -12,7 +12,7 @@ from tieline.network.queues import QUEUES, DropTail, Queue, QueueEntry
 from tieline.network.queues.drop_tail import MOST_PACKETS
 from tieline.network.spec import Transport
 from tieline.network.traffic import TRAFFIC
-from tieline.units import BitsPerSecond, Seconds
+from tieline.units import BitsPerSecond, Bytes, Seconds, Share, Unit
 
 TAGGED: dict[str, dict[str, type[Entry]]] = {
     "distribution": JITTERS,
@@ -31,38 +31,62 @@ PlainOrMapping = Discriminator(_plain_or_mapping)
 """Tells a number from a model with its parameters, so that each fault is told once."""
 
 QueueOrLimit = Annotated[
-    Annotated[int, Field(ge=1, le=MOST_PACKETS, strict=True), Tag("plain")]
+    Annotated[int, Field(ge=1, le=MOST_PACKETS, strict=True), Unit("packets"), Tag("plain")]
     | Annotated[QueueEntry, Tag("mapping")],
     PlainOrMapping,
 ]
 LossOrShare = Annotated[
-    Annotated[float, Field(ge=0, lt=1, strict=True), Tag("plain")]
-    | Annotated[LossEntry, Tag("mapping")],
+    Annotated[Share, Field(ge=0, lt=1), Tag("plain")] | Annotated[LossEntry, Tag("mapping")],
     PlainOrMapping,
 ]
+
+
+Kilometres = Annotated[float, Field(ge=-1e5, le=1e5), Unit("km")]
 
 
 class NodeEntry(Entry):
     """A substation and its buses."""
 
-    buses: list[Annotated[int, Field(strict=True)]] = Field(default_factory=list)
-    x: float | None = None
-    y: float | None = None
+    buses: list[Annotated[int, Field(strict=True), Unit("number")]] = Field(
+        [], description="numbers of the buses whose devices are wired to it"
+    )
+    x: Kilometres | None = Field(None, description="place in drawings, to the east")
+    y: Kilometres | None = Field(None, description="place in drawings, to the north")
 
 
 class LinkDefaults(Entry):
     """What a link takes where its own entry is silent."""
 
-    rate: BitsPerSecond | None = Field(None, ge=1, le=1e13)
-    queue: QueueOrLimit | None = None
-    loss: LossOrShare | None = None
-    jitter: JitterEntry | None = None
-    overhead: int | None = Field(None, ge=0, le=1000, strict=True)
-    framing: Literal["ethernet", "ppp", "ppp_hdlc", "t1", "sonet"] | None = None
-    mpls_labels: int | None = Field(None, ge=0, le=16, strict=True)
-    duplex: Literal["full", "half"] | None = None
-    mtu: int | None = Field(None, ge=68, le=65_535, strict=True)
-    cost: float | None = Field(None, gt=0, le=1e9)
+    rate: BitsPerSecond | None = Field(
+        None, ge=1, le=1e13, description="rate of either direction, the link layer's bytes included"
+    )
+    queue: QueueOrLimit | None = Field(
+        None, description="packets that may wait at either end, or a queue discipline"
+    )
+    loss: LossOrShare | None = Field(
+        None, description="probability that a packet is lost, or a loss model; none loses nothing"
+    )
+    jitter: JitterEntry | None = Field(
+        None, description="random delay added to the propagation of each packet; none adds nothing"
+    )
+    overhead: Bytes | None = Field(
+        None, ge=0, le=1000, description="bytes that the link layer adds to each packet; none: 0"
+    )
+    framing: Literal["ethernet", "ppp", "ppp_hdlc", "t1", "sonet"] | None = Field(
+        None, description="the link layer by name, in place of overhead"
+    )
+    mpls_labels: Annotated[int, Unit("labels")] | None = Field(
+        None, ge=0, le=16, strict=True, description="MPLS labels of 4 bytes on each packet; none: 0"
+    )
+    duplex: Literal["full", "half"] | None = Field(
+        None, description="both ends at once, or one at a time; none: full"
+    )
+    mtu: Bytes | None = Field(
+        None, ge=68, le=65_535, description="largest IP packet; none: that of Ethernet, 1500"
+    )
+    cost: Annotated[float, Unit("1")] | None = Field(
+        None, gt=0, le=1e9, description="what routing by cost counts; none: 1"
+    )
 
     @model_validator(mode="after")
     def _one_overhead(self) -> "LinkDefaults":
@@ -74,9 +98,11 @@ class LinkDefaults(Entry):
 class LinkEntry(LinkDefaults):
     """A link between two nodes."""
 
-    a: str
-    b: str
-    propagation: Seconds = Field(ge=0, le=10)
+    a: str = Field(description="node at one end")
+    b: str = Field(description="node at the other end")
+    propagation: Seconds = Field(
+        ge=0, le=10, description="from the last bit sent to the last bit received"
+    )
 
     def filled(self, defaults: LinkDefaults) -> dict[str, Any]:
         """Return what links have in common, from the defaults where not given."""
@@ -96,45 +122,74 @@ class LinkEntry(LinkDefaults):
 class PmuEntry(Entry):
     """The PMUs: time until a frame leaves, and how the frames travel."""
 
-    processing: Seconds = Field(0.0, ge=0, le=10)
-    jitter: JitterEntry | None = None
-    transport: Transport = "unicast"
-    dscp: int = Field(0, ge=0, le=63, strict=True)
+    processing: Seconds = Field(
+        0.0, ge=0, le=10, description="from the measurement until its frame leaves"
+    )
+    jitter: JitterEntry | None = Field(
+        None, description="random delay added to the processing of each frame"
+    )
+    transport: Transport = Field("unicast", description="how frames travel")
+    dscp: Annotated[int, Unit("number")] = Field(
+        0, ge=0, le=63, strict=True, description="differentiated services mark of frames"
+    )
 
 
 class ControllerEntry(Entry):
     """The controllers: time until they can use a frame."""
 
-    processing: Seconds = Field(0.0, ge=0, le=10)
-    jitter: JitterEntry | None = None
+    processing: Seconds = Field(
+        0.0, ge=0, le=10, description="from the arrival of a frame until it is used"
+    )
+    jitter: JitterEntry | None = Field(
+        None, description="random delay added to the processing of each frame"
+    )
 
 
 class RoutingEntry(Entry):
     """How routes are found, and whether they are found again after a failure."""
 
-    metric: Literal["delay", "hops", "cost"] = "delay"
-    equal_cost: Literal["first", "split"] = "first"
-    convergence: Seconds | None = Field(None, ge=0, le=1e4)
+    metric: Literal["delay", "hops", "cost"] = Field(
+        "delay", description="what the shortest route is short in"
+    )
+    equal_cost: Literal["first", "split"] = Field(
+        "first", description="whether flows take the first of equal routes, or are spread over them"
+    )
+    convergence: Seconds | None = Field(
+        None,
+        ge=0,
+        le=1e4,
+        description="from a failure or repair until routes follow; none: they never do",
+    )
 
 
 class RouteEntry(Entry):
     """A route that is fixed by hand."""
 
-    origin: str = Field(alias="from")
-    target: str = Field(alias="to")
-    via: list[str] = Field(default_factory=list)
+    origin: str = Field(alias="from", description="node that sends")
+    target: str = Field(alias="to", description="node that receives")
+    via: list[str] = Field([], description="nodes between them, in order")
 
 
 class EventEntry(Entry):
     """Something that happens to links at a time, for a time or for good."""
 
-    at: Seconds = Field(ge=0, le=1e6)
-    lasts: Seconds | None = Field(None, alias="for", gt=0, le=1e6)
-    event: Literal["link_down", "node_down", "rate", "loss"]
-    link: list[str] | None = Field(None, min_length=2, max_length=2)
-    node: str | None = None
-    rate: BitsPerSecond | None = Field(None, ge=1, le=1e13)
-    probability: float | None = Field(None, gt=0, lt=1, strict=True)
+    at: Seconds = Field(ge=0, le=1e6, description="instant at which it happens")
+    lasts: Seconds | None = Field(
+        None, alias="for", gt=0, le=1e6, description="time that it lasts; none: for good"
+    )
+    event: Literal["link_down", "node_down", "rate", "loss"] = Field(
+        description="what happens: a link or a node fails, a rate changes, packets are lost"
+    )
+    link: list[str] | None = Field(
+        None, min_length=2, max_length=2, description="the two nodes that the link joins"
+    )
+    node: str | None = Field(None, description="the node that fails")
+    rate: BitsPerSecond | None = Field(
+        None, ge=1, le=1e13, description="rate from then on, without the framing's share"
+    )
+    probability: Share | None = Field(
+        None, gt=0, lt=1, description="probability of loss, on one link or on all"
+    )
 
     @model_validator(mode="after")
     def _complete(self) -> "EventEntry":

@@ -1,13 +1,15 @@
 """What an experiment says about the packet network."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictFloat, model_validator
 
+from tieline.network.entry import InTheWordsOf
 from tieline.network.queues import QueueEntry
-from tieline.network.schema import JitterEntry
+from tieline.network.schema import EventEntry, JitterEntry
 from tieline.network.spec import Transport
-from tieline.units import Seconds
+from tieline.network.traffic import TRAFFIC
+from tieline.units import Seconds, Share, Unit
 
 PACKET_ENGINES = ("packet", "ns3")
 """The engines that simulate every packet of a topology."""
@@ -15,16 +17,22 @@ PACKET_ENGINES = ("packet", "ns3")
 MAX_DELAY_S = 10.0
 """Longest delay that a setting or a trace may have, s."""
 
+Flow = Annotated[dict[str, Any], InTheWordsOf(tuple(TRAFFIC.values()))]
+LinkEvent = Annotated[dict[str, Any], InTheWordsOf((EventEntry,))]
+"""Checked together with the topology's own, when the topology is read."""
+
 
 class PathSettings(BaseModel):
     """The delays of one path of the empirical engine."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    source: str = Field(description="PMU, by name or bus", coerce_numbers_to_str=True)
-    destination: str = Field(description="controller, by name or unit")
+    source: str = Field(
+        min_length=1, description="the PMU, by name or bus", coerce_numbers_to_str=True
+    )
+    destination: str = Field(min_length=1, description="the controller, by name or unit")
     distribution: JitterEntry = Field(description="distribution of the delays")
-    offset: Seconds = Field(0.0, ge=0, le=MAX_DELAY_S, description="added to each delay, s")
+    offset: Seconds = Field(0.0, ge=0, le=MAX_DELAY_S, description="time added to each delay")
 
 
 class EmpiricalSettings(BaseModel):
@@ -34,6 +42,7 @@ class EmpiricalSettings(BaseModel):
 
     trace: str | None = Field(
         None,
+        min_length=1,
         description=(
             "CSV file of measured delays: one column delay_s, or source, destination and delay_s"
         ),
@@ -45,13 +54,13 @@ class EmpiricalSettings(BaseModel):
         None, description="distribution of the delays of all paths, in place of a trace"
     )
     offset: Seconds = Field(
-        0.0, ge=0, le=MAX_DELAY_S, description="added to each delay of the distribution, s"
+        0.0, ge=0, le=MAX_DELAY_S, description="time added to each delay of the distribution"
     )
     paths: tuple[PathSettings, ...] = Field(
         (), description="paths with a distribution of their own, in place of that of all"
     )
     keep_order: StrictBool = Field(
-        True, description="a packet never overtakes the one before it on its path"
+        True, description="whether a packet never overtakes the one before it on its path"
     )
 
     @model_validator(mode="after")
@@ -80,10 +89,11 @@ class NetworkSettings(BaseModel):
         None,
         ge=0,
         le=10,
-        description="combined delay of the engines constant and helics-filters, s",
+        description="combined delay of the engines constant and helics-filters",
     )
     topology: str = Field(
         "case",
+        min_length=1,
         description=(
             "'case' for the case's own network.yaml, the name of another topology of the case, "
             "such as wan, or the path of a topology file"
@@ -94,11 +104,11 @@ class NetworkSettings(BaseModel):
         gt=0,
         le=10,
         description=(
-            "mean combined delay that the PMUs' processing times are lengthened to, s; "
+            "mean combined delay that the PMUs' processing times are lengthened to; "
             "none leaves the topology as it is"
         ),
     )
-    loss: StrictFloat | None = Field(
+    loss: Share | None = Field(
         None,
         ge=0,
         lt=1,
@@ -107,7 +117,13 @@ class NetworkSettings(BaseModel):
             "packet"
         ),
     )
-    cross_traffic: StrictFloat = Field(
+    jitter: JitterEntry | None = Field(
+        None,
+        description=(
+            "random delay that each link adds to each packet, in place of the topology's own"
+        ),
+    )
+    cross_traffic: Annotated[StrictFloat, Unit("1")] = Field(
         1.0, ge=0, le=20, description="factor on the rate of all cross traffic; 0 turns it off"
     )
     queue: QueueEntry | None = Field(
@@ -120,20 +136,24 @@ class NetworkSettings(BaseModel):
             "controller), multicast (one along a tree), tcp (a connection to each)"
         ),
     )
-    dscp: int | None = Field(
-        None, ge=0, le=63, strict=True, description="mark of frames, in place of the topology's own"
+    dscp: Annotated[int, Unit("number")] | None = Field(
+        None,
+        ge=0,
+        le=63,
+        strict=True,
+        description="differentiated services mark of frames, in place of the topology's own",
     )
-    traffic: tuple[dict[str, Any], ...] = Field(
+    traffic: tuple[Flow, ...] = Field(
         (), description="cross traffic besides the topology's own, in the words of its file"
     )
-    events: tuple[dict[str, Any], ...] = Field(
+    events: tuple[LinkEvent, ...] = Field(
         (), description="what happens to links besides the topology's own events"
     )
     convergence: Seconds | None = Field(
         None,
         ge=0,
         le=1e4,
-        description="time until routes follow a failure, in place of the topology's own, s",
+        description="time until routes follow a failure, in place of the topology's own",
     )
     capture: tuple[tuple[str, str], ...] = Field(
         (), description="links (pairs of nodes) whose packets are written to capture files"
@@ -141,13 +161,15 @@ class NetworkSettings(BaseModel):
     empirical: EmpiricalSettings | None = Field(
         None, description="where the empirical engine takes its delays from"
     )
-    record_packets: StrictBool = Field(False, description="write packets.parquet, one row a packet")
+    record_packets: StrictBool = Field(
+        False, description="whether packets.parquet is written, one row a packet"
+    )
     series_window: Seconds | None = Field(
         0.1,
         ge=1e-3,
         le=10,
         description=(
-            "length of the windows of link_series.parquet and controller_series.parquet, s; none "
+            "length of the windows of link_series.parquet and controller_series.parquet; none "
             "writes neither"
         ),
     )

@@ -1,10 +1,18 @@
 """The reference of all device models, made from their declarations."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from tieline.grid.models.base import ROLES, Model, Parameter
 from tieline.grid.models.registry import models
+
+PLURALS = {
+    "machine": "Machines",
+    "exciter": "Exciters",
+    "governor": "Governors",
+    "pss": "Power system stabilisers",
+}
+"""Titles of the roles."""
 
 
 @dataclass(frozen=True)
@@ -45,3 +53,31 @@ def as_text(entry: Entry) -> str:
         cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=False)]
         lines.append(f"    {'  '.join(cells)}  {row[3]}")
     return "\n".join(lines)
+
+
+def as_markdown(listed: Iterable[Entry]) -> str:
+    """Return entries as a page of the documentation, a section a model."""
+    blocks = [
+        "# Device models",
+        "Made by `tieline models --markdown` from what each model declares. Parameters are per unit"
+        " on the device's own base unless a unit is given.",
+    ]
+    role = None
+    for entry in listed:
+        if entry.role != role:
+            role = entry.role
+            blocks.append(f"## {PLURALS[role]}")
+        blocks += [
+            f"### {entry.key}",
+            entry.about,
+            f"Source: {entry.source}. States: {', '.join(entry.states) or 'none'}.",
+        ]
+        rows = [
+            f"| {p.symbol} | {'' if p.unit == '1' else p.unit} | {p.bounds} | {p.text} |"
+            for p in entry.parameters
+        ]
+        if rows:
+            blocks.append(
+                "\n".join(["| parameter | unit | bounds | meaning |", "|---|---|---|---|", *rows])
+            )
+    return "\n\n".join(blocks)

@@ -36,8 +36,8 @@ class ConstantJitter:
 class ConstantEntry(Entry):
     """The same delay for every packet."""
 
-    distribution: Literal["constant"]
-    delay: Seconds = Field(ge=0, le=10, description="the delay")
+    distribution: Literal["constant"] = Field(description="which distribution this is")
+    delay: Seconds = Field(ge=0, le=10, description="the delay of every packet")
 
     def jitter(self) -> Jitter:
         """Return the distribution."""

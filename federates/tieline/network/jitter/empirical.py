@@ -4,11 +4,11 @@ import csv
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from tieline.network.entry import Entry, named_file
 from tieline.network.jitter.base import Jitter
@@ -72,18 +72,19 @@ def _delay_ns(path: Path, line: int, given: str) -> int:
     return seconds_to_ns(delay_s)
 
 
-def _sample_of(value: Any, info: ValidationInfo) -> EmpiricalJitter:
-    return EmpiricalJitter(tuple(read_sample(named_file(value, info))))
+def _checked(path: Path) -> Path:
+    read_sample(path)
+    return path
 
 
 class EmpiricalEntry(Entry):
     """A sample in a CSV file with a column `delay_s`."""
 
-    distribution: Literal["empirical"]
-    file: Annotated[EmpiricalJitter, BeforeValidator(_sample_of)] = Field(
-        description="CSV file, relative to the topology file"
+    distribution: Literal["empirical"] = Field(description="which distribution this is")
+    file: Annotated[Path, BeforeValidator(named_file), AfterValidator(_checked)] = Field(
+        description="CSV file, relative to the file that names it"
     )
 
     def jitter(self) -> Jitter:
         """Return the distribution."""
-        return self.file
+        return EmpiricalJitter(tuple(read_sample(self.file)))

@@ -42,7 +42,7 @@ class GammaJitter:
 class GammaEntry(Entry):
     """A gamma distribution."""
 
-    distribution: Literal["gamma"]
+    distribution: Literal["gamma"] = Field(description="which distribution this is")
     mean: Seconds = Field(ge=1e-9, le=10, description="mean delay")
     deviation: Seconds = Field(ge=1e-9, le=10, description="standard deviation")
 

@@ -51,7 +51,7 @@ class NormalJitter:
 class NormalEntry(Entry):
     """A normal distribution cut to [0, 2 mean]."""
 
-    distribution: Literal["normal"]
+    distribution: Literal["normal"] = Field(description="which distribution this is")
     mean: Seconds = Field(ge=1e-9, le=10, description="mean delay")
     deviation: Seconds = Field(ge=1e-9, le=10, description="standard deviation before the cut")
 

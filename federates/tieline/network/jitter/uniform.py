@@ -37,7 +37,7 @@ class UniformJitter:
 class UniformEntry(Entry):
     """Equally likely between two ends."""
 
-    distribution: Literal["uniform"]
+    distribution: Literal["uniform"] = Field(description="which distribution this is")
     low: Seconds = Field(ge=0, le=10, description="least delay")
     high: Seconds = Field(ge=0, le=10, description="greatest delay")
 

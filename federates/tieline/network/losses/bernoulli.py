@@ -9,6 +9,7 @@ from pydantic import Field
 from tieline.network.draws import CHUNK, Chunks
 from tieline.network.entry import Entry
 from tieline.network.losses.base import Loss
+from tieline.units import Share
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,8 @@ class Bernoulli:
 class BernoulliEntry(Entry):
     """Independent losses."""
 
-    model: Literal["bernoulli"]
-    probability: float = Field(gt=0, lt=1, strict=True, description="of each packet")
+    model: Literal["bernoulli"] = Field(description="which loss model this is")
+    probability: Share = Field(gt=0, lt=1, description="probability that a packet is lost")
 
     def loss(self) -> Loss:
         """Return the model."""

@@ -10,6 +10,7 @@ from pydantic import Field
 from tieline.network.draws import CHUNK, Chunks
 from tieline.network.entry import Entry
 from tieline.network.losses.base import Loss
+from tieline.units import Share
 
 MOST = 1e-4
 """Greatest bit-error rate: a packet of 1,500 bytes hardly ever arrives at it."""
@@ -43,8 +44,8 @@ class BitError:
 class BitErrorEntry(Entry):
     """Independent bit errors."""
 
-    model: Literal["bit_error"]
-    rate: float = Field(ge=1e-15, le=MOST, strict=True, description="share of wrong bits")
+    model: Literal["bit_error"] = Field(description="which loss model this is")
+    rate: Share = Field(ge=1e-15, le=MOST, description="share of wrong bits")
 
     def loss(self) -> Loss:
         """Return the model."""

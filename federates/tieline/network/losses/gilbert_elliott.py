@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 from tieline.network.draws import CHUNK, NEVER, Chunk, Chunks, chunked
 from tieline.network.entry import Entry
 from tieline.network.losses.base import Loss
+from tieline.units import Share
 
 MOST_VISITS = 100_000
 """Visits to each state that are drawn at a time."""
@@ -100,11 +101,19 @@ class GilbertElliott:
 class GilbertElliottEntry(Entry):
     """Losses in bursts."""
 
-    model: Literal["gilbert_elliott"]
-    to_bad: float = Field(ge=1e-6, le=1, strict=True, description="good state ends, each packet")
-    to_good: float = Field(ge=1e-6, le=1, strict=True, description="bad state ends, each packet")
-    loss_good: float = Field(0.0, ge=0, lt=1, strict=True, description="loss in the good state")
-    loss_bad: float = Field(1.0, ge=1e-3, le=1, strict=True, description="loss in the bad state")
+    model: Literal["gilbert_elliott"] = Field(description="which loss model this is")
+    to_bad: Share = Field(
+        ge=1e-6, le=1, description="probability that the good state ends with a packet"
+    )
+    to_good: Share = Field(
+        ge=1e-6, le=1, description="probability that the bad state ends with a packet"
+    )
+    loss_good: Share = Field(
+        0.0, ge=0, lt=1, description="probability that a packet is lost in the good state"
+    )
+    loss_bad: Share = Field(
+        1.0, ge=1e-3, le=1, description="probability that a packet is lost in the bad state"
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> "GilbertElliottEntry":

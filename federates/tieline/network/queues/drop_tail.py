@@ -1,12 +1,13 @@
 """One line, first in, first out, limited in packets or in bytes."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from tieline.network.entry import Entry
 from tieline.network.queues.base import NO_LIMIT, EarlyDetection, Queue, WaitingLine
+from tieline.units import Bytes, Unit
 
 MOST_PACKETS = 100_000
 MOST_BYTES = 1 << 30
@@ -45,14 +46,18 @@ class DropTail:
 class DropTailEntry(Entry):
     """A queue that drops what comes when it is full."""
 
-    discipline: Literal["drop_tail"]
-    packets: int | None = Field(None, ge=1, le=MOST_PACKETS, strict=True, description="limit")
-    bytes: int | None = Field(
+    discipline: Literal["drop_tail"] = Field(description="which queue this is")
+    packets: Annotated[int, Unit("packets")] | None = Field(
+        None, ge=1, le=MOST_PACKETS, strict=True, description="the most packets that may wait"
+    )
+    bytes: Bytes | None = Field(
         None,
         ge=1,
         le=MOST_BYTES,
-        strict=True,
-        description=f"limit; without 'packets' no more than {MOST_PACKETS} packets wait either",
+        description=(
+            "the most bytes that may wait; without 'packets' no more than "
+            f"{MOST_PACKETS} packets wait either"
+        ),
     )
 
     @model_validator(mode="after")

@@ -5,13 +5,16 @@ Networking 1 (1993). From `high` on every packet is dropped (no gentle mode).
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from tieline.network.entry import Entry
 from tieline.network.queues.base import EarlyDetection, Queue, WaitingLine
 from tieline.network.queues.drop_tail import MOST_PACKETS
+from tieline.units import Share, Unit
+
+Packets = Annotated[float, Unit("packets")]
 
 
 @dataclass(frozen=True)
@@ -39,12 +42,20 @@ class RandomEarlyDetection:
 class EarlyDetectionEntry(Entry):
     """A queue that drops some packets early."""
 
-    discipline: Literal["red"]
-    packets: int = Field(ge=1, le=MOST_PACKETS, strict=True, description="limit")
-    low: float = Field(gt=0, description="averaged packets below which none is dropped")
-    high: float = Field(gt=0, description="averaged packets from which all are dropped")
-    probability: float = Field(0.1, gt=0, le=1, description="share dropped near 'high'")
-    weight_shift: int = Field(9, ge=1, le=16, description="the average's weight is 2^-this")
+    discipline: Literal["red"] = Field(description="which queue this is")
+    packets: Annotated[int, Unit("packets")] = Field(
+        ge=1, le=MOST_PACKETS, strict=True, description="the most packets that may wait"
+    )
+    low: Packets = Field(
+        gt=0, le=MOST_PACKETS, description="averaged packets below which none is dropped"
+    )
+    high: Packets = Field(
+        gt=0, le=MOST_PACKETS, description="averaged packets from which all are dropped"
+    )
+    probability: Share = Field(0.1, gt=0, le=1, description="share dropped near 'high'")
+    weight_shift: Annotated[int, Unit("1")] = Field(
+        9, ge=1, le=16, description="the newest sample weighs 2^-this in the average"
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> "EarlyDetectionEntry":

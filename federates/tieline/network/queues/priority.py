@@ -43,8 +43,10 @@ class StrictPriority:
 class PriorityEntry(Entry):
     """Classes, the most urgent first."""
 
-    discipline: Literal["priority"]
-    classes: list[ClassEntry] = Field(min_length=1, max_length=8)
+    discipline: Literal["priority"] = Field(description="which queue this is")
+    classes: list[ClassEntry] = Field(
+        min_length=1, max_length=8, description="waiting lines, the most urgent first"
+    )
 
     @model_validator(mode="after")
     def _distinct(self) -> "PriorityEntry":
@@ -53,5 +55,5 @@ class PriorityEntry(Entry):
 
     def queue(self) -> Queue:
         """Return the discipline."""
-        lines = tuple(WaitingLine(entry.packets, entry.bytes) for entry in self.classes)
+        lines = tuple(entry.line() for entry in self.classes)
         return StrictPriority(lines, tuple(frozenset(entry.dscp) for entry in self.classes))

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from tieline.network.entry import Entry
 from tieline.network.queues.base import EarlyDetection, Queue, WaitingLine
 from tieline.network.queues.classes import ClassEntry, check_marks, line_of
+from tieline.units import Bytes
 
 
 @dataclass(frozen=True)
@@ -44,14 +45,16 @@ class DeficitRoundRobin:
 class ShareEntry(ClassEntry):
     """A class with its quantum."""
 
-    quantum: int = Field(ge=1, le=1_000_000, strict=True, description="bytes a visit")
+    quantum: Bytes = Field(ge=1, le=1_000_000, description="bytes that it may send at a visit")
 
 
 class RoundRobinEntry(Entry):
     """Classes that share the link."""
 
-    discipline: Literal["deficit_round_robin"]
-    classes: list[ShareEntry] = Field(min_length=2, max_length=8)
+    discipline: Literal["deficit_round_robin"] = Field(description="which queue this is")
+    classes: list[ShareEntry] = Field(
+        min_length=2, max_length=8, description="waiting lines that are visited in turn"
+    )
 
     @model_validator(mode="after")
     def _distinct(self) -> "RoundRobinEntry":
@@ -60,7 +63,5 @@ class RoundRobinEntry(Entry):
 
     def queue(self) -> Queue:
         """Return the discipline."""
-        lines = tuple(
-            WaitingLine(entry.packets, entry.bytes, entry.quantum) for entry in self.classes
-        )
+        lines = tuple(entry.line(entry.quantum) for entry in self.classes)
         return DeficitRoundRobin(lines, tuple(frozenset(entry.dscp) for entry in self.classes))

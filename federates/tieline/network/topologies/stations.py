@@ -71,13 +71,21 @@ def _naming_bus(members: Sequence[Bus], pmus: Sequence[int]) -> Bus:
 
 
 def corridors_of(grid: PowerGrid, stations: Sequence[Station]) -> tuple[Corridor, ...]:
+    """Return the corridors of a grid, as `lines_of`, if they join all its stations.
+
+    Raises:
+        InputError: the corridors do not join all stations.
+    """
+    found = lines_of(grid, stations)
+    _refuse_islands(grid, stations, found)
+    return found
+
+
+def lines_of(grid: PowerGrid, stations: Sequence[Station]) -> tuple[Corridor, ...]:
     """Return the corridors of a grid in the order of their ends' names, one for each pair.
 
     A circuit's length is its reactance over that of a typical line of its voltage, the higher one
     of its ends.
-
-    Raises:
-        InputError: the corridors do not join all stations.
     """
     kv = {bus.number: bus.base_kv for bus in grid.buses}
     station = {bus: found.name for found in stations for bus in found.buses}
@@ -89,9 +97,7 @@ def corridors_of(grid: PowerGrid, stations: Sequence[Station]) -> tuple[Corridor
         pair = (ends[0], ends[1])
         km = _length_km(branch, max(kv[branch.start], kv[branch.end]), grid.base_mva)
         shortest[pair] = min(km, shortest.get(pair, km))
-    found = tuple(Corridor(a, b, km) for (a, b), km in sorted(shortest.items()))
-    _refuse_islands(grid, stations, found)
-    return found
+    return tuple(Corridor(a, b, km) for (a, b), km in sorted(shortest.items()))
 
 
 def _length_km(branch: Branch, kv: float, base_mva: float) -> float:

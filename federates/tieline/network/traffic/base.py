@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from tieline.network.draws import Chunks
 from tieline.network.entry import Entry
-from tieline.units import NS_PER_S, BitsPerSecond, Seconds
+from tieline.units import NS_PER_S, BitsPerSecond, Bytes, Seconds, Unit
 
 UDP_HEADER, IP_HEADER = 8, 20
 HEADER_BYTES = UDP_HEADER + IP_HEADER
@@ -86,7 +86,7 @@ class AtRate:
         return replace(self, rate_bps=self.rate_bps * factor)
 
 
-Payload = Annotated[int, Field(ge=1, le=MOST_PAYLOAD, strict=True, description="payload, bytes")]
+Payload = Annotated[Bytes, Field(ge=1, le=MOST_PAYLOAD, description="payload of each datagram")]
 Rate = Annotated[
     BitsPerSecond,
     Field(ge=1, le=MOST_RATE, description="mean rate of payload, UDP and IPv4 headers"),
@@ -100,7 +100,9 @@ class FlowEntry(Entry):
     target: str = Field(alias="to", description="node that receives")
     start: Seconds = Field(0.0, ge=0, le=1e6, description="when it begins")
     stop: Seconds | None = Field(None, gt=0, le=1e6, description="when it ends; none: never")
-    dscp: int = Field(0, ge=0, le=63, strict=True, description="differentiated services mark")
+    dscp: Annotated[int, Unit("number")] = Field(
+        0, ge=0, le=63, strict=True, description="differentiated services mark of its packets"
+    )
 
     @model_validator(mode="after")
     def _in_order(self) -> "FlowEntry":

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from tieline.network.draws import CHUNK, Chunks
 from tieline.network.traffic.base import AtRate, FlowEntry, Payload, Rate, Traffic
@@ -28,7 +29,7 @@ class Cbr(AtRate):
 class CbrEntry(FlowEntry):
     """Constant bit rate."""
 
-    kind: Literal["cbr"]
+    kind: Literal["cbr"] = Field(description="which traffic this is")
     rate: Rate
     payload: Payload
 

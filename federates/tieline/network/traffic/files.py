@@ -9,7 +9,7 @@ from pydantic import Field
 
 from tieline.network.draws import CHUNK, NEVER, Chunk, Chunks, chunked
 from tieline.network.traffic.base import HEADER_BYTES, FlowEntry, Payload, Rate, Traffic
-from tieline.units import NS_PER_S, Seconds, seconds_to_ns
+from tieline.units import NS_PER_S, Bytes, Seconds, seconds_to_ns
 
 
 @dataclass(frozen=True)
@@ -65,10 +65,10 @@ class Files:
 class FilesEntry(FlowEntry):
     """File transfers."""
 
-    kind: Literal["files"]
+    kind: Literal["files"] = Field(description="which traffic this is")
     rate: Rate = Field(description="rate while a file is sent")
     payload: Payload
-    size: int = Field(ge=1, le=10**10, strict=True, description="bytes of a file")
+    size: Bytes = Field(ge=1, le=10**10, description="size of a file")
     interval: Seconds = Field(gt=0, le=1e5, description="mean time between requests for a file")
 
     def traffic(self) -> Traffic:

@@ -12,7 +12,7 @@ from tieline.units import Seconds
 class FloodEntry(FlowEntry):
     """A flooding attack: Poisson traffic with a start that must be stated."""
 
-    kind: Literal["flood"]
+    kind: Literal["flood"] = Field(description="which traffic this is")
     rate: Rate
     payload: Payload = 18
     start: Seconds = Field(ge=0, le=1e6, description="when it begins")

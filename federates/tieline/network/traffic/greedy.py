@@ -2,13 +2,14 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
 from tieline.network.draws import NEVER, Chunks, chunked
 from tieline.network.traffic.base import FlowEntry, Payload, Traffic
+from tieline.units import Unit
 
 MOST_WINDOW = 1024
 
@@ -42,9 +43,9 @@ class Greedy:
 class GreedyEntry(FlowEntry):
     """A greedy connection."""
 
-    kind: Literal["greedy"]
-    payload: Payload = Field(1460, description="payload of a segment, bytes")
-    window: int = Field(
+    kind: Literal["greedy"] = Field(description="which traffic this is")
+    payload: Payload = Field(1460, description="payload of a segment")
+    window: Annotated[int, Unit("segments")] = Field(
         90, ge=1, le=MOST_WINDOW, strict=True, description="most segments under way"
     )
 

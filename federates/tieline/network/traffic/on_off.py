@@ -7,7 +7,7 @@ Networking 5, 1997).
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 
 from tieline.network.draws import CHUNK, NEVER, Chunk, Chunks, chunked
 from tieline.network.traffic.base import HEADER_BYTES, FlowEntry, Payload, Rate, Traffic
-from tieline.units import NS_PER_S, Seconds, seconds_to_ns
+from tieline.units import NS_PER_S, Seconds, Unit, seconds_to_ns
 
 MOST_PERIODS = 1000
 """Mean times on from one datagram to the next: all of them are drawn to find it."""
@@ -81,13 +81,13 @@ class OnOff:
 class OnOffEntry(FlowEntry):
     """On-off traffic."""
 
-    kind: Literal["on_off"]
+    kind: Literal["on_off"] = Field(description="which traffic this is")
     rate: Rate = Field(description="rate while on, of payload, UDP and IPv4 headers")
     payload: Payload
     # Not `on` and `off`, which YAML 1.1 takes for true and false.
     mean_on: Seconds = Field(gt=0, le=1e4, description="mean time on")
     mean_off: Seconds = Field(gt=0, le=1e4, description="mean time off")
-    shape: float | None = Field(
+    shape: Annotated[float, Unit("1")] | None = Field(
         None, gt=1, le=10, description="shape of Pareto times; none: exponential times"
     )
 

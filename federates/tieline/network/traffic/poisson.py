@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from tieline.network.draws import CHUNK, Chunks
 from tieline.network.traffic.base import AtRate, FlowEntry, Payload, Rate, Traffic
@@ -23,7 +24,7 @@ class Poisson(AtRate):
 class PoissonEntry(FlowEntry):
     """Poisson traffic."""
 
-    kind: Literal["poisson"]
+    kind: Literal["poisson"] = Field(description="which traffic this is")
     rate: Rate
     payload: Payload
 

@@ -48,10 +48,10 @@ class Polling:
 class PollingEntry(FlowEntry):
     """SCADA polling."""
 
-    kind: Literal["polling"]
+    kind: Literal["polling"] = Field(description="which traffic this is")
     interval: Seconds = Field(ge=1e-3, le=1e5, description="time from request to request")
-    payload: Payload = Field(12, description="payload of a request, bytes")
-    reply: Payload = Field(250, description="payload of a reply, bytes")
+    payload: Payload = Field(12, description="payload of a request")
+    reply: Payload = Field(250, description="payload of a reply")
     think: Seconds = Field(0.005, ge=0, le=10, description="from a request to its reply")
 
     def traffic(self) -> Traffic:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, ValidationInfo
+from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
 from tieline.errors import InputError
 from tieline.network.draws import NEVER, Chunks, chunked
@@ -132,8 +132,8 @@ def _trace_of(value: Any, info: ValidationInfo) -> Trace:
 class TraceEntry(FlowEntry):
     """Recorded traffic."""
 
-    kind: Literal["trace"]
-    file: Annotated[Trace, BeforeValidator(_trace_of)] = Field(
+    kind: Literal["trace"] = Field(description="which traffic this is")
+    file: Annotated[Trace, BeforeValidator(_trace_of), WithJsonSchema({"type": "string"})] = Field(
         description="CSV or pcap file, relative to the topology file"
     )
 

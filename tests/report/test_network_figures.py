@@ -8,20 +8,29 @@ import pytest
 
 from network.test_series import recorded
 from tieline.errors import InputError
-from tieline.network.plots import busiest_links, controller_ages, controller_delays, draw
+from tieline.report.network_figures import (
+    busiest_links,
+    controller_ages,
+    controller_delays,
+    draw,
+    has_series,
+)
 
 
 def test_a_run_with_series_gets_its_figures(tmp_path: Path) -> None:
     """Otherwise nobody could see when a controller's data came late."""
     recorded(tmp_path / "r", 1)
+    assert has_series(tmp_path / "r")
     names = [path.name for path in draw(tmp_path / "r")]
     assert names == ["controller_delay.png", "controller_age.png", "busiest_links.png"]
     assert all((tmp_path / "r" / "plots" / name).stat().st_size > 10_000 for name in names)
+    assert all((tmp_path / "r" / "plots" / name).with_suffix(".svg").is_file() for name in names)
 
 
 def test_a_run_without_series_is_refused(tmp_path: Path) -> None:
     """Otherwise an empty figure would pass for a quiet network."""
     recorded(tmp_path / "r", 1, window_ns=None)
+    assert not has_series(tmp_path / "r")
     with pytest.raises(InputError, match=r"controller_series\.parquet is missing"):
         draw(tmp_path / "r")
 

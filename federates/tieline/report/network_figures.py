@@ -22,7 +22,7 @@ def draw(folder: Path, plots: Path | None = None) -> list[Path]:
 
     Args:
         folder: the run's, with `controller_series.parquet` and `link_series.parquet`.
-        plots: where the PNG files go instead; made if missing.
+        plots: where the files go instead; made if missing.
 
     Raises:
         InputError: the run has no series.
@@ -37,6 +37,14 @@ def draw(folder: Path, plots: Path | None = None) -> list[Path]:
         if len(links):
             figures["busiest_links"] = busiest_links(links)
         return save(folder / "plots" if plots is None else plots, figures)
+
+
+def has_series(folder: Path) -> bool:
+    """Return whether a run's folder holds the series that `draw` needs, with any packet in them."""
+    paths = [folder / f"{name}.parquet" for name in ("controller_series", "link_series")]
+    return all(path.is_file() for path in paths) and bool(
+        read_table(paths[0], ["delivered"])["delivered"].any()
+    )
 
 
 def controller_delays(series: pd.DataFrame) -> Figure:

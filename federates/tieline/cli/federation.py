@@ -1,0 +1,137 @@
+"""`tieline export-helics`, `broker`, `join` and `gather`: federates that tieline does not start."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from tieline.cli.options import Debug, Reference, Settings
+from tieline.cli.run import planned
+from tieline.console import reporting, say
+from tieline.errors import InputError
+from tieline.units import ns_to_seconds, quantity
+
+if TYPE_CHECKING:
+    from tieline.experiment.plan import PlannedRun
+    from tieline.experiment.sweep import Point
+    from tieline.experiment.watch import Progress
+
+PORT = 23_404
+"""Where HELICS's own programs look for a broker."""
+
+Port = Annotated[int, typer.Option(min=1024, max=32_000, help="where the broker listens")]
+Wait = Annotated[str, typer.Option(metavar="TIME", help="longest wait until all have come")]
+AllowRemote = Annotated[
+    bool, typer.Option("--allow-remote", help="let an address be one that other hosts can reach")
+]
+Target = Annotated[Path, typer.Option(metavar="DIR", help="the result folder, new or empty")]
+
+
+def export_helics(
+    reference: Reference,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="folder for the files; else helics/NAME")
+    ] = None,
+    port: Port = PORT,
+    settings: Settings = None,
+    debug: Debug = False,
+) -> None:
+    """Write a run as HELICS's own runner and federate files, for `helics run`."""
+    from tieline.experiment.export import export_helics as export
+    from tieline.experiment.export import single_run
+
+    with reporting(debug):
+        plan = planned(reference, settings or [])
+        folder = out or Path("helics") / plan.study.name
+        runner = export(single_run(plan, "export-helics"), folder, port)
+        say(f"helics run --path={runner}\ntieline gather {folder} --out RESULT")
+
+
+def gather(
+    folders: Annotated[
+        list[Path], typer.Argument(metavar="DIR...", help="folders of one run's federates")
+    ],
+    out: Target,
+    debug: Debug = False,
+) -> None:
+    """Make one result of what federates have left in folders of their own."""
+    from tieline.experiment.gather import gather as gather_folders
+    from tieline.experiment.report import report as write_report
+
+    with reporting(debug):
+        write_report(gather_folders(folders, out), Console())
+
+
+def broker(
+    reference: Reference,
+    host: Annotated[str, typer.Option(metavar="H", help="address of this host")] = "127.0.0.1",
+    port: Port = PORT,
+    wait: Wait = "10 min",
+    allow_remote: AllowRemote = False,
+    settings: Settings = None,
+    debug: Debug = False,
+) -> None:
+    """Be the broker of a run whose federates are on other hosts."""
+    from tieline.experiment.export import single_run
+    from tieline.experiment.hosts import check_address, serve
+    from tieline.experiment.progress import shown_progress
+
+    with reporting(debug):
+        check_address(host, allow_remote)
+        plan = planned(reference, settings or [])
+        run = single_run(plan, "broker")
+        with shown_progress(plan.study.points, Console()) as on_progress:
+            outcome = serve(run, host, port, _seconds(wait), say, _of_grid(run, on_progress))
+        say(f"both federates reached the end, in {sum(outcome.wall_s.values()):.1f} s")
+
+
+def join(
+    reference: Reference,
+    federate: Annotated[str, typer.Option(metavar="grid|network", help="which one runs here")],
+    broker: Annotated[str, typer.Option(metavar="H:PORT", help="where the broker listens")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="folder for its tables, new or empty")],
+    wait: Wait = "10 min",
+    allow_remote: AllowRemote = False,
+    settings: Settings = None,
+    debug: Debug = False,
+) -> None:
+    """Run the grid or the network of a run whose broker is elsewhere."""
+    from tieline.cosim.interfaces import FEDERATES
+    from tieline.experiment.export import single_run
+    from tieline.experiment.hosts import check_address
+    from tieline.experiment.hosts import join as join_run
+
+    with reporting(debug):
+        host, port = _address(broker)
+        check_address(host, allow_remote)
+        if federate not in FEDERATES:
+            raise InputError(f"--federate must be grid or network (got {federate!r})")
+        run = single_run(planned(reference, settings or []), "join")
+        join_run(run, federate, (host, port), out, _seconds(wait), say)
+        say(f"the {federate} reached the end; its tables are in {out}")
+
+
+def _of_grid(
+    run: "PlannedRun", on_progress: "Callable[[Point, float], None]"
+) -> "Callable[[Progress], None]":
+    def report(progress: "Progress") -> None:
+        if progress.federate == "grid":
+            on_progress(run.point, ns_to_seconds(max(0, progress.granted_ns)))
+
+    return report
+
+
+def _seconds(text: str) -> float:
+    try:
+        return quantity(text, "time")
+    except ValueError as error:
+        raise InputError(f"--wait {error}") from error
+
+
+def _address(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdigit() or not 0 < int(port) < 65_536:
+        raise InputError(f"--broker must be HOST:PORT, such as 192.0.2.1:{PORT} (got {text!r})")
+    return host, int(port)

@@ -1,0 +1,86 @@
+"""Packs curves for a page: thinned without losing an extreme, rounded to 16 bits, compressed."""
+
+import base64
+import zlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+MISSING = 65535
+"""The code of a value that is not there."""
+
+MOST_INSTANTS = 6000
+"""Of a curve in a page; above, two stand for each interval."""
+
+
+def thinned(time_s: Floats, rows: Floats, most: int = MOST_INSTANTS) -> tuple[Floats, Floats]:
+    """Return at most `most` instants, and the least and the greatest value around each pair.
+
+    The instants are cut into equal intervals. Each keeps its first and last instant, with the
+    least and the greatest value of each curve in the order in which they occur: every extreme
+    stays, at most one interval from its place.
+
+    Args:
+        time_s: (m,) instants.
+        rows: (n, m) curves; NaN where there is no value.
+        most: at least 2.
+    """
+    count = len(time_s)
+    if count <= most:
+        return time_s, rows
+    length = -(-count // (most // 2))
+    starts = np.arange(0, count, length)
+    last = np.minimum(starts + length, count) - 1
+    padded = np.full((len(rows), len(starts) * length), np.nan)
+    padded[:, :count] = rows
+    parts = padded.reshape(len(rows), len(starts), length)
+    empty = np.isnan(parts).all(axis=2)
+    low_at = np.argmin(np.where(np.isnan(parts), np.inf, parts), axis=2)
+    high_at = np.argmax(np.where(np.isnan(parts), -np.inf, parts), axis=2)
+    first = np.minimum(low_at, high_at)[..., None]
+    second = np.maximum(low_at, high_at)[..., None]
+    kept = np.empty((len(rows), len(starts), 2))
+    kept[..., 0] = np.take_along_axis(parts, first, axis=2)[..., 0]
+    kept[..., 1] = np.take_along_axis(parts, second, axis=2)[..., 0]
+    kept[empty] = np.nan
+    instants = np.stack([time_s[starts], time_s[last]], axis=1).ravel()
+    return instants, kept.reshape(len(rows), -1)
+
+
+def packed(rows: Floats) -> dict[str, Any]:
+    """Return curves as the page's `unpack.js` reads them.
+
+    Each curve is rounded to 65,534 steps of its own range; whole numbers of a smaller range stay
+    exact. Differences of successive codes, low bytes before high bytes, are compressed (zlib) and
+    written as base64.
+
+    Args:
+        rows: (n, m) curves; NaN where there is no value.
+    """
+    rows = np.asarray(rows, np.float64)
+    empty = np.isnan(rows).all(axis=1)
+    low, span = np.zeros(len(rows)), np.zeros(len(rows))
+    if not empty.all():
+        low[~empty] = np.nanmin(rows[~empty], axis=1)
+        span[~empty] = np.nanmax(rows[~empty], axis=1) - low[~empty]
+    is_whole = np.array([_is_whole(row) for row in rows], bool) & (span < MISSING)
+    step = np.where(is_whole | (span == 0), 1.0, span / (MISSING - 1))
+    codes = np.where(np.isnan(rows), MISSING, (rows - low[:, None]) / step[:, None])
+    whole = np.round(codes).astype(np.uint16)
+    steps = np.diff(whole, axis=1, prepend=np.zeros((len(rows), 1), np.uint16)).astype("<u2")
+    planes = np.ascontiguousarray(steps).view(np.uint8).reshape(-1, 2).T
+    return {
+        "rows": rows.shape[0],
+        "length": rows.shape[1],
+        "low": low.tolist(),
+        "step": step.tolist(),
+        "data": base64.b64encode(zlib.compress(planes.tobytes(), 6)).decode(),
+    }
+
+
+def _is_whole(row: Floats) -> bool:
+    values = row[~np.isnan(row)]
+    return bool(np.all(values == np.round(values)))
