@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 import yaml
 from packaging.requirements import Requirement
 from packaging.version import Version
 
 import tieline
+from tieline.cli import app
+from tieline.experiment.load import load_experiment
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 PROJECT: dict[str, Any] = tomllib.loads((CHECKOUT / "pyproject.toml").read_text("utf-8"))
@@ -93,3 +96,25 @@ def test_compose_runs_this_release_with_one_experiment_for_all() -> None:
     (host,) = [w.removeprefix("--host=") for w in sides[0] if w.startswith("--host=")]
     assert services["broker"]["networks"]["federation"]["ipv4_address"] == host
     assert all(f"--broker={host}:23404" in side for side in sides[1:])
+
+
+@pytest.mark.parametrize("name", ["broker", "grid", "network", "gather", "recorder"])
+def test_each_service_gives_a_command_that_the_program_takes(name: str) -> None:
+    """A renamed option would end every container at its start."""
+    compose = yaml.safe_load((CHECKOUT / "docker" / "compose.yaml").read_text("utf-8"))
+    words = [
+        re.sub(r"\$\{\w+:-(\w+)\}", r"\1", word) for word in compose["services"][name]["command"]
+    ]
+    group = typer.main.get_command(app)
+    assert isinstance(group, typer.core.TyperGroup)
+    command = group.commands[words[0]]
+    assert command.make_context(words[0], words[1:]).params
+
+
+def test_the_recorders_experiment_in_the_compose_file_is_a_valid_one(tmp_path: Path) -> None:
+    """It stands in the compose file, where no other test would read it."""
+    compose = yaml.safe_load((CHECKOUT / "docker" / "compose.yaml").read_text("utf-8"))
+    path = tmp_path / "recorder.yaml"
+    path.write_text(compose["configs"]["recorder"]["content"], encoding="utf-8")
+    (guest,) = load_experiment(str(path)).points[0].experiment.federation.guests
+    assert guest.units == ("G34",)
