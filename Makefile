@@ -22,7 +22,7 @@ help:
 	@echo "make clean   remove the environment and everything that was built"
 
 demo: $(VENV)/runtime
-	$(BIN)/tieline run g26_trip
+	$(BIN)/tieline run g26_trip --core zmq
 
 test: $(VENV)/development
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile

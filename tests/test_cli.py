@@ -14,6 +14,7 @@ from tieline.errors import CosimError
 from tieline.experiment import plan
 from tieline.experiment import report as experiment_report
 from tieline.experiment.results import read_manifest
+from tieline.experiment.sweep_run import InTurn
 
 SETTINGS = [part for setting in CONSTANT for part in ("--set", setting)]
 
@@ -23,6 +24,7 @@ def _no_federation(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Stand in for case, network and launcher; each test works in a folder of its own."""
     monkeypatch.setattr(plan.prepare, "__defaults__", (known_sites,))
     monkeypatch.setattr(run_command, "launcher", lambda: fake_launch)
+    monkeypatch.setattr(run_command, "sweep_runner", lambda *_: InTurn(fake_launch))
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.chdir(tmp_path)
     Path("tiny.yaml").write_text(EXPERIMENT)
@@ -59,7 +61,7 @@ def test_a_sweep_has_one_row_a_point() -> None:
     assert result.exit_code == 0, result.output
     rows = [line for line in result.output.splitlines() if "59.766" in line]
     assert [row.split("  ")[0].strip() for row in rows] == ["ideal", "0.25 s"]
-    assert "[2/2] 0.25 s: 41.0 of 41 s" in result.output
+    assert "[2/2] 0.25 s: complete" in result.output
 
 
 @pytest.mark.usefixtures("_no_drawing")

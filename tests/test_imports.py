@@ -64,6 +64,22 @@ def test_the_launcher_starts_federates_and_does_not_import_them() -> None:
         assert not begins(imports(path), *forbidden), path
 
 
+def test_what_compares_reads_result_folders_only() -> None:
+    """A comparison that reached into a simulation could show what no folder holds."""
+    for path in part("compare"):
+        packages = ("grid", "network", "cosim", "wams", "sweeps")
+        assert not begins(imports(path), *(f"tieline.{name}" for name in packages)), path
+
+
+def test_only_the_cluster_needs_dask() -> None:
+    """Dask is an extra: without it, all else must work."""
+    for path in MODULES:
+        if path != ROOT / "sweeps" / "cluster.py":
+            assert not begins(imports(path), "distributed", "dask", "tieline.sweeps.cluster") or (
+                path == ROOT / "sweeps" / "start.py"
+            ), path
+
+
 @pytest.mark.parametrize("name", ["report", "plots", "summary", "table"])
 def test_what_reports_reads_result_folders_only(name: str) -> None:
     """A report that reached into a simulation could show what no folder holds."""

@@ -27,7 +27,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 # numba calls first-class functions experimental at each compilation that sees one.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
-UNCOMPILED = ("api", "cli", "experiment", "report", "paper")
+UNCOMPILED = ("api", "cli", "compare", "doctor", "experiment", "paper", "report", "sweeps")
 """Parts of the package that hold no compiled code, and that none of it takes anything from."""
 
 CACHES_KEPT = 4
@@ -55,6 +55,15 @@ def _use_own_cache() -> None:
     for old in others[CACHES_KEPT:]:
         shutil.rmtree(old, ignore_errors=True)
     numba.config.CACHE_DIR = str(folder)
+
+
+def cached() -> tuple[Path | None, int]:
+    """Return the cache folder in use (None: numba's own beside each file) and how much it holds.
+
+    The second is the number of compiled functions.
+    """
+    folder = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else None
+    return folder, 0 if folder is None else sum(1 for _ in folder.rglob("*.nbi"))
 
 
 IS_ON = os.environ.get("TIELINE_COMPILER", "on") != "off"

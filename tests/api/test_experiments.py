@@ -11,6 +11,7 @@ from synthetic_result import EXPERIMENT, SWEEP, fake_launch, known_sites
 from tieline.api import running
 from tieline.api.settings import options
 from tieline.experiment import plan
+from tieline.experiment.sweep_run import InTurn
 
 ENGINE: dict[str, Any] = {"network.engine": "constant", "network.delay": "250 ms"}
 
@@ -20,6 +21,7 @@ def _no_federation(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Stand in for case, network and launcher; each test works in a folder of its own."""
     monkeypatch.setattr(plan.prepare, "__defaults__", (known_sites,))
     monkeypatch.setattr(running, "launch", fake_launch)
+    monkeypatch.setattr(running, "runner_of", lambda plan, jobs, scheduler: InTurn(fake_launch))
     monkeypatch.chdir(tmp_path)
     Path("tiny.yaml").write_text(EXPERIMENT)
     Path("swept.yaml").write_text(EXPERIMENT + SWEEP)

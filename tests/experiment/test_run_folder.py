@@ -132,20 +132,6 @@ def test_an_interrupted_run_is_marked_too(
     assert "grid.parquet" in manifest["tables"]
 
 
-def test_a_failed_point_leaves_the_earlier_ones_whole(tmp_path: Path) -> None:
-    """Otherwise one bad point would cost the sweep."""
-    target = tmp_path / "out"
-    with pytest.raises(RunFailedError, match="lost"):
-        execute(plan_of(tmp_path, EXPERIMENT + SWEEP), target, fails_at("0.25-s"))
-    manifest = read_manifest(target)
-    assert (manifest["kind"], manifest["status"], manifest["reason"]) == (
-        "sweep",
-        "incomplete",
-        "lost",
-    )
-    assert [run.is_complete for run in read_runs(target)] == [True, False]
-
-
 def test_a_sweep_has_a_summary_of_all_its_points(tmp_path: Path) -> None:
     """Otherwise every reader would have to gather them."""
     folder = execute(plan_of(tmp_path, EXPERIMENT + SWEEP), tmp_path / "out", fake_launch)

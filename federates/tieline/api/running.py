@@ -15,8 +15,10 @@ from tieline.errors import InputError
 from tieline.experiment.launch import launch
 from tieline.experiment.load import load_experiment, shipped_experiments
 from tieline.experiment.plan import Plan, prepare
-from tieline.experiment.run import default_target, execute
+from tieline.experiment.run import check_target, default_target, execute
 from tieline.experiment.sweep import Point
+from tieline.experiment.sweep_run import Listener, run_sweep
+from tieline.sweeps.start import runner_of, with_core
 from tieline.yaml_lines import load as load_yaml
 
 OnProgress = Callable[[str, float], None]
@@ -56,16 +58,26 @@ class Experiment:
         runs = [run.point for run in self.plan.runs]
         return {self._label(point): point.experiment.model_dump(mode="json") for point in runs}
 
-    def run(self, out: str | Path | None = None, progress: OnProgress | bool = False) -> Result:
+    def run(
+        self,
+        out: str | Path | None = None,
+        progress: OnProgress | bool = False,
+        *,
+        jobs: int | None = None,
+        scheduler: str | None = None,
+    ) -> Result:
         """Run it as the command line does, in processes of its own, and return its result.
 
         Args:
             out: the result folder, new, empty or an earlier result; one in `results/` without it.
+                A sweep goes on in its folder: points that are finished there are not run again.
             progress: True prints a line at each quarter; or a function of a run's label and the
                 simulated time that it has reached, s.
+            jobs: points of a sweep at once on this machine; without it, as many as suit it.
+            scheduler: address of a Dask scheduler whose workers run the points instead.
 
         Raises:
-            InputError: `out` holds something else.
+            InputError: `out` holds something else, or no such jobs or scheduler can be.
             TielineError: a run failed; what it wrote is kept, marked incomplete.
         """
         target = _free_target(self.name) if out is None else Path(out)
@@ -75,7 +87,11 @@ class Experiment:
             if tell is not None:
                 tell(self._label(point), time_s)
 
-        return Result(execute(self.plan, target, launch, on_progress))
+        check_target(target)
+        if not self.plan.study.is_sweep:
+            return Result(execute(self.plan, target, launch, on_progress))
+        runner = runner_of(self.plan, jobs, scheduler)
+        return Result(run_sweep(self.plan, target, runner, Listener(on_progress)))
 
     def _label(self, point: Point) -> str:
         return point.label or self.name
@@ -123,7 +139,7 @@ def load(
     try:
         if isinstance(reference, Mapping):
             return _from_content(reference, chosen)
-        return Experiment(prepare(load_experiment(str(reference), chosen)))
+        return Experiment(prepare(with_core(load_experiment(str(reference), chosen))))
     except InputError as error:
         raise without_options(error) from None
 
@@ -134,6 +150,8 @@ def run(
     *,
     out: str | Path | None = None,
     progress: OnProgress | bool = False,
+    jobs: int | None = None,
+    scheduler: str | None = None,
     **groups: Any,
 ) -> Result:
     """Run an experiment and return its result: `load` and `Experiment.run` in one.
@@ -142,7 +160,7 @@ def run(
         InputError: anything is wrong with the experiment, or `out` holds something else.
         TielineError: a run failed; what it wrote is kept, marked incomplete.
     """
-    return load(reference, settings, **groups).run(out, progress)
+    return load(reference, settings, **groups).run(out, progress, jobs=jobs, scheduler=scheduler)
 
 
 def experiments() -> pd.DataFrame:
@@ -163,7 +181,7 @@ def _from_content(content: Mapping[str, Any], chosen: list[str]) -> Experiment:
         except yaml.YAMLError as error:
             raise InputError(f"the experiment holds what no YAML file can: {error}") from error
         try:
-            return Experiment(prepare(load_experiment(str(path), chosen)))
+            return Experiment(prepare(with_core(load_experiment(str(path), chosen))))
         except InputError as error:
             raise InputError(_without_file(finding, path) for finding in error.findings) from None
 

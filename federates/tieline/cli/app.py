@@ -5,7 +5,18 @@ from typing import Annotated
 import typer
 
 import tieline
-from tieline.cli import config, federation, linear, models, report, reproduce, run
+from tieline.cli import (
+    compare,
+    config,
+    doctor,
+    federation,
+    linear,
+    models,
+    report,
+    reproduce,
+    run,
+    sweep,
+)
 from tieline.cli.topology import topology
 from tieline.console import say
 from tieline.errors import InputError
@@ -15,7 +26,14 @@ HELP = """A power grid and the packet network that carries its measurements, sim
 `tieline list` shows the experiments that come with it; `tieline run NAME` runs one.
 """
 
-app = typer.Typer(help=HELP, add_completion=False, rich_markup_mode=None)
+EXIT_CODES = """\b
+Exit codes: 0 done and whole; 1 unexpected error; 2 bad input, nothing was started;
+3 the mathematics failed (power flow, initial point, a value not finite);
+4 the federation failed (a process died, hung or broke the time contract);
+130 interrupted. A sweep with failed points ends with the code of the first of them.
+"""
+
+app = typer.Typer(help=HELP, epilog=EXIT_CODES, rich_markup_mode=None)
 
 
 def main() -> None:
@@ -40,8 +58,11 @@ def _common(
 
 for command in (
     run.run,
+    sweep.sweep,
     run.list_,
     run.validate,
+    compare.compare,
+    compare.plot,
     report.report,
     models.models,
     config.schema,
@@ -52,6 +73,7 @@ for command in (
     federation.broker,
     federation.join,
     federation.gather,
+    doctor.doctor,
     linear.modes,
     linear.freqresp,
     linear.damping,

@@ -15,7 +15,7 @@ from tieline.units import ns_to_seconds, quantity
 
 if TYPE_CHECKING:
     from tieline.experiment.plan import PlannedRun
-    from tieline.experiment.sweep import Point
+    from tieline.experiment.sweep_run import Listener
     from tieline.experiment.watch import Progress
 
 PORT = 23_404
@@ -82,8 +82,8 @@ def broker(
         check_address(host, allow_remote)
         plan = planned(reference, settings or [])
         run = single_run(plan, "broker")
-        with shown_progress(plan.study.points, Console()) as on_progress:
-            outcome = serve(run, host, port, _seconds(wait), say, _of_grid(run, on_progress))
+        with shown_progress(plan.study.points, Console()) as listener:
+            outcome = serve(run, host, port, _seconds(wait), say, _of_grid(run, listener))
         say(f"both federates reached the end, in {sum(outcome.wall_s.values()):.1f} s")
 
 
@@ -113,12 +113,10 @@ def join(
         say(f"the {federate} reached the end; its tables are in {out}")
 
 
-def _of_grid(
-    run: "PlannedRun", on_progress: "Callable[[Point, float], None]"
-) -> "Callable[[Progress], None]":
+def _of_grid(run: "PlannedRun", listener: "Listener") -> "Callable[[Progress], None]":
     def report(progress: "Progress") -> None:
-        if progress.federate == "grid":
-            on_progress(run.point, ns_to_seconds(max(0, progress.granted_ns)))
+        if progress.federate == "grid" and listener.on_time is not None:
+            listener.on_time(run.point, ns_to_seconds(max(0, progress.granted_ns)))
 
     return report
 

@@ -1,22 +1,33 @@
 """`tieline run`, `list` and `validate`: experiments, run and checked."""
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
-from tieline.cli.options import Debug, Reference, Settings
+from tieline.cli.options import (
+    AsJson,
+    Core,
+    Debug,
+    Jobs,
+    OptionalReference,
+    Quiet,
+    Reference,
+    Settings,
+)
 from tieline.console import reporting, say
 from tieline.errors import InputError
 from tieline.experiment.layers import read_layers
-from tieline.experiment.load import load_experiment, shipped_experiments
+from tieline.experiment.load import Study, load_experiment, shipped_experiments
 from tieline.resources import shipped
 from tieline.yaml_lines import load as load_yaml
 
 if TYPE_CHECKING:
     from tieline.experiment.plan import Plan
     from tieline.experiment.run import Launch
+    from tieline.experiment.sweep_run import Runner
 
 MOST_LABELS = 12
 
@@ -28,36 +39,48 @@ WITHOUT_NAME = """Give the name of a shipped experiment, or the path of a YAML f
 """
 
 
+MOST_DRAWN = 24
+"""Points of a sweep that a table and plots can show; of more, their spread is shown."""
+
+
 def run(
-    reference: Annotated[
-        str | None, typer.Argument(metavar="CONFIG|NAME", help="a file, or a shipped name")
-    ] = None,
+    reference: OptionalReference = None,
     settings: Settings = None,
-    core: Annotated[
-        str | None,
-        typer.Option(
-            metavar="zmq|tcp|inproc|local", help="how the federates meet; local is without HELICS"
-        ),
-    ] = None,
+    core: Core = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="the result folder; else one in results/")
     ] = None,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
     debug: Debug = False,
 ) -> None:
-    """Run an experiment and write its result folder, with a table, plots and a page."""
+    """Run an experiment and write its result folder, with a table, plots and a page.
+
+    A sweep runs its points at once, as `tieline sweep` does.
+    """
+    from tieline.sweeps.start import with_core
+
     with reporting(debug):
         if reference is None:
             say(WITHOUT_NAME)
             say(catalogue())
             raise typer.Exit(InputError.exit_code)
         options = [*(settings or ()), *([f"federation.core={core}"] if core else ())]
-        _run(reference, options, out)
+        study = load_experiment(reference, options)
+        if study.is_sweep:
+            run_sweep_plan(with_core(study), out, jobs, None, False, quiet, as_json)
+        else:
+            _run_single(study, out, quiet, as_json)
 
 
-def list_() -> None:
+def list_(as_json: AsJson = False) -> None:
     """List the shipped experiments, each with the question that it answers, and the cases."""
     with reporting():
-        say(catalogue())
+        if as_json:
+            typer.echo(json.dumps(shipped_things(), indent=2, ensure_ascii=False))
+        else:
+            say(catalogue())
 
 
 def validate(reference: Reference, settings: Settings = None, debug: Debug = False) -> None:
@@ -73,9 +96,14 @@ def validate(reference: Reference, settings: Settings = None, debug: Debug = Fal
 
 def planned(reference: str, settings: list[str]) -> "Plan":
     """Return the checked plan of an experiment."""
+    return prepared(load_experiment(reference, settings))
+
+
+def prepared(study: Study) -> "Plan":
+    """Return the plan of a study, checked against its case and network."""
     from tieline.experiment.plan import prepare
 
-    return prepare(load_experiment(reference, settings))
+    return prepare(study)
 
 
 def launcher() -> "Launch":
@@ -85,29 +113,124 @@ def launcher() -> "Launch":
     return launch
 
 
+def sweep_runner(plan: "Plan", jobs: int | None, scheduler: str | None) -> "Runner":
+    """Return what runs the points of a sweep."""
+    from tieline.sweeps.start import runner_of
+
+    return runner_of(plan, jobs, scheduler)
+
+
+def shipped_things() -> dict[str, list[dict[str, object]]]:
+    """Return the shipped experiments and cases, as `tieline list --json` prints them."""
+    experiments: list[dict[str, object]] = []
+    for path in shipped_experiments():
+        data = read_layers(path).data
+        question = " ".join(data["question"].split())
+        experiments.append({"name": path.stem, "question": question, "is_sweep": "sweep" in data})
+    cases: list[dict[str, object]] = [
+        {"name": path.parent.name, "title": load_yaml(path).data.get("title", "")}
+        for path in sorted(shipped("cases").glob("*/case.yaml"))
+    ]
+    return {"experiments": experiments, "cases": cases}
+
+
 def catalogue() -> str:
     """Return the list of shipped experiments and cases."""
+    things = shipped_things()
     lines = ["Experiments:"]
-    for path in shipped_experiments():
-        question = " ".join(read_layers(path).data["question"].split())
-        lines += [f"  {path.stem}", f"      {question}"]
+    for entry in things["experiments"]:
+        sweep = "  (a sweep)" if entry["is_sweep"] else ""
+        lines += [f"  {entry['name']}{sweep}", f"      {entry['question']}"]
     lines.append("Cases:")
-    for path in sorted(shipped("cases").glob("*/case.yaml")):
-        lines.append(f"  {path.parent.name}: {load_yaml(path).data.get('title', '')}")
+    lines += [f"  {entry['name']}: {entry['title']}" for entry in things["cases"]]
     return "\n".join(lines)
 
 
-def _run(reference: str, options: list[str], out: Path | None) -> None:
+def run_sweep_plan(
+    study: Study,
+    out: Path | None,
+    jobs: int | None,
+    scheduler: str | None,
+    fresh: bool,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Run a sweep, show its course and its table, and tell how to go on when it is interrupted."""
     from tieline.experiment.progress import shown_progress
-    from tieline.experiment.report import report as write_report
-    from tieline.experiment.run import check_target, default_target, execute
+    from tieline.experiment.run import check_target, default_target
+    from tieline.experiment.sweep_run import PointsFailedError, run_sweep
+
+    target = out or default_target(study.name)
+    check_target(target)
+    console = Console(quiet=quiet or as_json)
+    plan = prepared(study)
+    runner = sweep_runner(plan, jobs, scheduler)
+    console.print(study.question, markup=False, highlight=False, soft_wrap=True)
+    try:
+        with shown_progress(study.points, console) as listener:
+            run_sweep(plan, target, runner, listener, fresh)
+    except PointsFailedError as error:
+        if len(error.failures) < len(plan.runs):
+            _show(target, console, quiet, as_json)
+        elif as_json:
+            _print_json(target)
+        raise
+    except KeyboardInterrupt:
+        typer.echo(
+            f"finished points are kept; go on with: tieline sweep --resume {target}", err=True
+        )
+        raise
+    _show(target, console, quiet, as_json)
+
+
+def _run_single(study: Study, out: Path | None, quiet: bool, as_json: bool) -> None:
+    from tieline.experiment.progress import shown_progress
+    from tieline.experiment.run import RunFailedError, check_target, default_target, execute
 
     if out is not None:
         check_target(out)
-    plan = planned(reference, options)
-    target = out or default_target(plan.study.name)
-    console = Console()
-    say(plan.study.question)
-    with shown_progress(plan.study.points, console) as on_progress:
-        folder = execute(plan, target, launcher(), on_progress)
-    write_report(folder, console)
+    plan = prepared(study)
+    console = Console(quiet=quiet or as_json)
+    console.print(study.question, markup=False, highlight=False, soft_wrap=True)
+    try:
+        with shown_progress(study.points, console) as listener:
+            folder = execute(plan, out or default_target(study.name), launcher(), listener.on_time)
+    except RunFailedError as error:
+        if as_json:
+            _print_json(error.folder)
+        raise
+    _show(folder, console, quiet, as_json)
+
+
+def _show(folder: Path, console: Console, quiet: bool, as_json: bool) -> None:
+    """Write table and plots of a result, and show it as was asked for."""
+    from tieline.experiment.report import report as write_report
+    from tieline.experiment.results import read_runs
+
+    if len(read_runs(folder)) > MOST_DRAWN:
+        _show_spread(folder, console)
+    else:
+        write_report(folder, console)
+    if as_json:
+        _print_json(folder)
+    elif quiet:
+        typer.echo(folder)
+
+
+def _show_spread(folder: Path, console: Console) -> None:
+    """Show what many points are like together, and where each stands."""
+    from tieline.experiment.points_table import spread
+
+    lines = [
+        spread(folder).to_string(float_format=lambda value: f"{value:.6g}"),
+        f"table   {folder / 'points.csv'}",
+        f"plots   of all points: tieline report {folder}",
+        f"plots   of some: tieline plot {folder}:LABEL QUANTITY...",
+    ]
+    console.print("\n".join(lines), markup=False, highlight=False, soft_wrap=True)
+
+
+def _print_json(folder: Path) -> None:
+    from tieline.experiment.answer import answer
+
+    typer.echo(json.dumps(answer(folder), indent=2, ensure_ascii=False))

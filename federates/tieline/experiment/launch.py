@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -19,7 +20,7 @@ from tieline.cosim.runfile import federation_of
 from tieline.errors import CosimError, TielineError
 from tieline.experiment.guests import GuestProcess, guest_processes
 from tieline.experiment.remote import Remote
-from tieline.experiment.supervise import Child, ProcessUse, end_all
+from tieline.experiment.supervise import Child, ProcessUse, Start, end_all, executed
 from tieline.experiment.watch import Progress, Suspect, Watch
 
 BROKER = "broker"
@@ -81,6 +82,7 @@ def launch(
     commands: Mapping[str, Sequence[str]] | None = None,
     order: Sequence[str] = FEDERATES,
     stagger_s: float = 0.0,
+    start: Start = executed,
 ) -> Outcome:
     """Run the federation of `folder/run.json` to its end and return how it went.
 
@@ -90,6 +92,7 @@ def launch(
         commands: replaces entries of `COMMANDS`.
         order: which federate is started first.
         stagger_s: wall time between the two starts, s.
+        start: how each process comes to be.
 
     Raises:
         FederateFailedError: a process died, failed, hung or never joined; every process is ended by
@@ -111,7 +114,8 @@ def launch(
             broker = [*table[BROKER], settings.core, str(port), members]
             starts = [(BROKER, broker), *((name, [*table[name], str(run_file)]) for name in order)]
         guests = guest_processes(run, folder)
-        return Processes(folder, Watch(settings), on_progress, guests).run(starts, stagger_s)
+        processes = Processes(folder, Watch(settings), on_progress, guests, start=start)
+        return processes.run(starts, stagger_s)
 
 
 class Processes:
@@ -125,6 +129,7 @@ class Processes:
         remotes: processes of other hosts.
         on_fault: told who is at fault, or that the user is, before everything is ended.
         on_word: given every word as it came.
+        start: how a federate or the broker comes to be.
     """
 
     def __init__(
@@ -137,6 +142,7 @@ class Processes:
         remotes: Sequence[Remote] = (),
         on_fault: Callable[[Suspect], None] | None = None,
         on_word: Callable[[Mapping[str, Any]], None] | None = None,
+        start: Start = executed,
     ) -> None:
         self._folder = folder
         self._on_progress = on_progress
@@ -144,6 +150,7 @@ class Processes:
         self._guests = list(guests)
         self._on_fault = on_fault
         self._on_word = on_word
+        self._start_process = start
         self._children: dict[str, Child | Remote] = {remote.name: remote for remote in remotes}
         self._marks: dict[str, float] = {}
 
@@ -165,12 +172,12 @@ class Processes:
         for name, command in starts:
             if name in FEDERATES and any(other in FEDERATES for other in self._children):
                 time.sleep(stagger_s)
-            self._start_one(name, command, None)
+            self._start_one(name, command, self._start_process)
 
-    def _start_one(self, name: str, command: Sequence[str], directory: Path | None) -> None:
+    def _start_one(self, name: str, command: Sequence[str], start: Start) -> None:
         log = self._folder / "logs" / f"{name}.log"
         try:
-            self._children[name] = Child(name, command, log, directory)
+            self._children[name] = Child(name, command, log, start)
         except OSError as error:
             self._fail(Suspect(name, f"could not be started: {error}", CosimError.exit_code))
 
@@ -178,7 +185,8 @@ class Processes:
         """Start the guests once the federates are opened, so that none waits for a compiler."""
         while self._guests and self._watch.is_opened():
             guest = self._guests.pop()
-            self._start_one(guest.name, guest.command, guest.directory)
+            start = partial(executed, directory=guest.directory)
+            self._start_one(guest.name, guest.command, start)
 
     def _follow(self) -> None:
         before_s = time.monotonic()

@@ -3,22 +3,24 @@
 import hashlib
 import importlib.metadata
 import json
+import pathlib
 import platform
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import tieline
 from tieline.experiment.launch import Outcome
-from tieline.experiment.plan import PlannedRun
+from tieline.experiment.plan import Plan, PlannedRun
 from tieline.experiment.results import FORMAT, MANIFEST, table_hash
+from tieline.experiment.sweep import Point
+from tieline.problems import Path, value_at
 
 STREAMS = "one numpy PCG64 generator a random thing, from the seed and its name (tieline.streams)"
 
 _PACKAGES = ("helics", "numpy", "scipy", "numba", "pandas", "pyarrow", "pydantic", "networkx")
 
 
-def write_json(path: Path, data: object) -> None:
+def write_json(path: pathlib.Path, data: object) -> None:
     """Write a JSON file that appears whole or not at all."""
     text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
     part = path.with_name(f".{path.name}.part")
@@ -69,15 +71,30 @@ def run_manifest(
     }
 
 
-def sweep_manifest(runs: tuple[PlannedRun, ...], reason: str | None) -> dict[str, Any]:
+def ended(base: Mapping[str, Any], facts: Mapping[str, Any], reason: str | None) -> dict[str, Any]:
+    """Return the manifest of a run that has ended, from what it was when it began.
+
+    Args:
+        base: its manifest as `run_manifest` gave it.
+        facts: as `run_facts` returns them.
+        reason: why the run is incomplete, or None when it is whole.
+    """
+    status = "complete" if reason is None else "incomplete"
+    return {**base, "status": status, "reason": reason, **facts}
+
+
+def sweep_manifest(plan: Plan, reason: str | None) -> dict[str, Any]:
     """Return the manifest of a sweep; each of its points has one of its own."""
+    runs, sources = plan.runs, plan.study.sources
     first = runs[0].point.experiment
+    paths = dict.fromkeys(own.path for run in runs for own in run.point.overrides)
     points = [
         {
             "label": run.point.label,
             "slug": run.point.slug,
             "run_id": run.run["run_id"],
             "config_hash": run.run["config_hash"],
+            "settings": _swept(run.point, paths),
         }
         for run in runs
     ]
@@ -91,16 +108,29 @@ def sweep_manifest(runs: tuple[PlannedRun, ...], reason: str | None) -> dict[str
         "question": first.question,
         "points": points,
         "config_hash": hashlib.sha256(hashes.encode()).hexdigest(),
+        "config_file": str(sources.document.path.resolve()),
+        "options": [f"{_key(given.path)}={json.dumps(given.value)}" for given in sources.options],
         "versions": versions(),
     }
 
 
-def save_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
+def _swept(point: Point, paths: Iterable[Path]) -> dict[str, Any]:
+    """Return a point's values, in SI units, of the settings that the sweep changes anywhere."""
+    config = point.experiment.model_dump(mode="json")
+    return {_key(path): value_at(config, path) for path in paths}
+
+
+def _key(path: Path) -> str:
+    """Return a path as `--set` and a sweep write it."""
+    return ".".join(map(str, path))
+
+
+def save_manifest(folder: pathlib.Path, manifest: Mapping[str, Any]) -> None:
     """Write a manifest into its folder."""
     write_json(folder / MANIFEST, manifest)
 
 
-def run_facts(outcome: Outcome | None, folder: Path) -> dict[str, Any]:
+def run_facts(outcome: Outcome | None, folder: pathlib.Path) -> dict[str, Any]:
     """Return what a launch found out (if it got so far) and the content hash of every table."""
     hashes = {path.name: table_hash(path) for path in sorted(folder.glob("*.parquet"))}
     if outcome is None:

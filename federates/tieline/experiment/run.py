@@ -6,50 +6,14 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from tieline.cosim.interfaces import GRID
 from tieline.errors import InputError, TielineError
-from tieline.experiment.launch import Outcome
-from tieline.experiment.manifest import (
-    run_facts,
-    run_manifest,
-    save_manifest,
-    sweep_manifest,
-    write_json,
-)
-from tieline.experiment.plan import Plan, PlannedRun
-from tieline.experiment.results import (
-    MAP,
-    POINTS,
-    SUMMARY,
-    Run,
-    is_result,
-    read_manifest,
-    read_runs,
-)
-from tieline.experiment.summary import summarise
+from tieline.experiment.plan import Plan
+from tieline.experiment.point import Launch, run_in, task_of
+from tieline.experiment.results import is_result, read_manifest
 from tieline.experiment.sweep import Point
-from tieline.experiment.watch import Progress
-from tieline.tables import salvage
-from tieline.units import ns_to_seconds
+from tieline.experiment.sweep_run import InTurn, Listener, RunFailedError, run_sweep
 
-UNDER_WAY = "the run did not end: it is under way, or was killed"
-
-Launch = Callable[[Path, Callable[[Progress], None]], Outcome]
-"""Runs the federation of a folder's run.json to its end, or raises a CosimError."""
-
-
-class RunFailedError(TielineError):
-    """A run ended early; what it wrote is kept.
-
-    Attributes:
-        folder: the result folder, marked incomplete.
-        exit_code: that of the error that ended the run.
-    """
-
-    def __init__(self, error: TielineError, folder: Path) -> None:
-        super().__init__(f"{error}\nwhat was written is in {folder}, marked incomplete")
-        self.folder = folder
-        self.exit_code = error.exit_code
+__all__ = ["Launch", "RunFailedError", "check_target", "default_target", "execute"]
 
 
 def default_target(name: str) -> Path:
@@ -80,9 +44,10 @@ def execute(
 ) -> Path:
     """Run every point of a plan in order, and return the result folder.
 
-    The folder is written beside the target under a temporary name and takes the target's name at
-    the end, replacing an earlier result there. If a run fails, what was written is kept, marked
-    incomplete; an earlier result at the target is then left alone.
+    The folder of a single run is written beside the target under a temporary name and takes the
+    target's name at the end, replacing an earlier result there. If the run fails, what was written
+    is kept, marked incomplete; an earlier result at the target is then left alone. A sweep goes on
+    in its folder, as `run_sweep` does.
 
     Args:
         plan: what to run.
@@ -95,63 +60,24 @@ def execute(
         RunFailedError: a run failed.
     """
     check_target(target)
+    if plan.study.is_sweep:
+        return run_sweep(plan, target, InTurn(launch), Listener(on_progress))
     work = _work_folder(target)
+    task = task_of(plan.runs[0], target)
+
+    def on_time(time_s: float) -> None:
+        if on_progress is not None:
+            on_progress(plan.runs[0].point, time_s)
+
     try:
-        _run_all(plan, work, launch, on_progress)
+        run_in(work, task, launch, on_time)
     except TielineError as error:
-        kept = _keep_incomplete(plan, work, target, error)
-        raise RunFailedError(error, kept) from error
-    except BaseException as error:
-        _keep_incomplete(plan, work, target, error)
+        raise RunFailedError(error, _keep_incomplete(work, target)) from error
+    except BaseException:
+        _keep_incomplete(work, target)
         raise
     _move(work, target)
     return target
-
-
-def _run_all(
-    plan: Plan, work: Path, launch: Launch, on_progress: Callable[[Point, float], None] | None
-) -> None:
-    if not plan.study.is_sweep:
-        _run_one(plan.runs[0], work, launch, on_progress)
-        return
-    save_manifest(work, sweep_manifest(plan.runs, UNDER_WAY))
-    for planned in plan.runs:
-        folder = work / POINTS / planned.point.slug
-        folder.mkdir(parents=True)
-        _run_one(planned, folder, launch, on_progress)
-    summaries = [run.summary() for run in read_runs(work)]
-    write_json(work / SUMMARY, {"name": plan.study.name, "points": summaries})
-    save_manifest(work, sweep_manifest(plan.runs, None))
-
-
-def _run_one(
-    planned: PlannedRun,
-    folder: Path,
-    launch: Launch,
-    on_progress: Callable[[Point, float], None] | None,
-) -> None:
-    write_json(folder / "run.json", planned.run)
-    if planned.interconnection is not None:
-        from tieline.experiment.interconnection import placed
-
-        write_json(folder / MAP, placed(planned.interconnection))
-    save_manifest(folder, run_manifest(planned, {}, UNDER_WAY))
-
-    def report(progress: Progress) -> None:
-        if on_progress is not None and progress.federate == GRID:
-            on_progress(planned.point, ns_to_seconds(max(0, progress.granted_ns)))
-
-    outcome = None
-    try:
-        outcome = launch(folder, report)
-        facts = run_facts(outcome, folder)
-        write_json(folder / SUMMARY, summarise(Run(folder, run_manifest(planned, facts, None))))
-    except BaseException as error:
-        salvage(folder)
-        facts = run_facts(getattr(error, "outcome", outcome), folder)
-        save_manifest(folder, run_manifest(planned, facts, _reason(error)))
-        raise
-    save_manifest(folder, run_manifest(planned, facts, None))
 
 
 def _work_folder(target: Path) -> Path:
@@ -163,10 +89,8 @@ def _work_folder(target: Path) -> Path:
     return work
 
 
-def _keep_incomplete(plan: Plan, work: Path, target: Path, error: BaseException) -> Path:
-    """Mark a failed result, give it a name that overwrites nothing whole, and return that."""
-    if plan.study.is_sweep:
-        save_manifest(work, sweep_manifest(plan.runs, _reason(error)))
+def _keep_incomplete(work: Path, target: Path) -> Path:
+    """Give a failed result a name that overwrites nothing whole, and return that."""
     has_older = is_result(target) and read_manifest(target)["status"] == "complete"
     kept = target.with_name(f"{target.name}-incomplete") if has_older else target
     _move(work, kept)
@@ -180,9 +104,3 @@ def _move(work: Path, target: Path) -> None:
     work.rename(target)
     if older.exists():
         shutil.rmtree(older)
-
-
-def _reason(error: BaseException) -> str:
-    if isinstance(error, KeyboardInterrupt):
-        return "interrupted from the keyboard"
-    return str(error) if isinstance(error, TielineError) else f"{type(error).__name__}: {error}"

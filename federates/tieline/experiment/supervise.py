@@ -7,10 +7,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import IO, Any, Protocol
 
 import tieline
 from tieline.cosim.process import LAUNCHER_VARIABLE
@@ -47,6 +47,34 @@ class Process(Protocol):
         """End it."""
 
 
+class Started(Protocol):
+    """A process that was started, in a session of its own, with pipes on its output."""
+
+    pid: int
+    stdout: IO[bytes] | None
+    stderr: IO[bytes] | None
+    returncode: int | None
+
+
+Start = Callable[[Sequence[str], Mapping[str, str]], Started]
+"""Starts a command in an environment, or raises an OSError."""
+
+
+def executed(
+    command: Sequence[str], environment: Mapping[str, str], directory: Path | None = None
+) -> Started:
+    """Start a command as a new program, in a directory or here."""
+    return subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=environment,
+        cwd=directory,
+        start_new_session=True,
+    )
+
+
 class Log:
     """A text file that stops growing at 1 MB, and its last lines, which are kept in any case."""
 
@@ -79,7 +107,7 @@ class Child:
         name: what the run calls it.
         command: the program and its arguments.
         log: where its standard error, and whatever else it says, is kept.
-        directory: where it runs; None for here.
+        start: how the process comes to be.
 
     Attributes:
         exit_code: None while it runs; negative for the signal that killed it.
@@ -87,22 +115,14 @@ class Child:
     """
 
     def __init__(
-        self, name: str, command: Sequence[str], log: Path, directory: Path | None = None
+        self, name: str, command: Sequence[str], log: Path, start: Start = executed
     ) -> None:
         self.name = name
         self.exit_code: int | None = None
         self.reason: str | None = None
         self.use: ProcessUse | None = None
         self._peak_bytes = 0
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env=_environment(),
-            cwd=directory,
-            start_new_session=True,
-        )
+        self._process = start(command, child_environment())
         self.log = Log(log)
         assert self._process.stdout is not None
         assert self._process.stderr is not None
@@ -238,7 +258,8 @@ def shared_environment(before: Mapping[str, str]) -> dict[str, str]:
     return shared
 
 
-def _environment() -> dict[str, str]:
+def child_environment() -> dict[str, str]:
+    """Return the environment of a process that must not outlive this one."""
     own = {LAUNCHER_VARIABLE: str(os.getpid())}
     return dict(os.environ) | shared_environment(os.environ) | own
 

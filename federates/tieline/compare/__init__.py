@@ -1,0 +1,1 @@
+"""Looks at results side by side: their figures, their settings, and what they recorded."""

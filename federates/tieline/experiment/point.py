@@ -1,0 +1,190 @@
+"""Runs one point in its folder, wherever that is: told by plain data, and marked for what it is."""
+
+import os
+import shutil
+import socket
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import tieline
+from tieline.cosim.interfaces import GRID
+from tieline.errors import CosimError, InputError, TielineError
+from tieline.experiment.launch import Outcome
+from tieline.experiment.manifest import (
+    ended,
+    run_facts,
+    run_manifest,
+    save_manifest,
+    versions,
+    write_json,
+)
+from tieline.experiment.plan import PlannedRun
+from tieline.experiment.results import MANIFEST, MAP, SUMMARY, Run, is_result, read_manifest
+from tieline.experiment.summary import summarise
+from tieline.experiment.watch import Progress
+from tieline.tables import salvage
+from tieline.units import ns_to_seconds
+
+UNDER_WAY = "the run did not end: it is under way, or was killed"
+
+Launch = Callable[[Path, Callable[[Progress], None]], Outcome]
+"""Runs the federation of a folder's run.json to its end, or raises a CosimError."""
+
+OnTime = Callable[[float], None]
+"""Is told the simulated time that a run has reached, s."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """All that whoever runs a point must know; plain data that JSON carries unchanged.
+
+    Attributes:
+        folder: where the result belongs in the end, absolute.
+        files: content of the JSON files that the run begins with, by their names.
+        manifest: of the run as it is under way.
+    """
+
+    folder: str
+    files: Mapping[str, Any]
+    manifest: Mapping[str, Any]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the task as JSON carries it."""
+        return asdict(self)
+
+
+def task_of(planned: PlannedRun, folder: Path) -> Task:
+    """Return the task of one planned run whose result belongs into `folder`."""
+    files: dict[str, Any] = {"run.json": dict(planned.run)}
+    if planned.interconnection is not None:
+        from tieline.experiment.interconnection import placed
+
+        files[MAP] = placed(planned.interconnection)
+    return Task(str(folder.resolve()), files, run_manifest(planned, {}, UNDER_WAY))
+
+
+def run_in(work: Path, task: Task, launch: Launch, on_time: OnTime | None = None) -> None:
+    """Run a task in the folder `work`, which exists and is empty.
+
+    If it fails, what was written is made readable and marked incomplete with the reason.
+
+    Raises:
+        TielineError: the run failed.
+    """
+    for name, content in task.files.items():
+        write_json(work / name, content)
+    # Who runs it is what made it, whoever planned it.
+    base = {**task.manifest, "versions": versions()}
+    save_manifest(work, base)
+
+    def report(progress: Progress) -> None:
+        if on_time is not None and progress.federate == GRID:
+            on_time(ns_to_seconds(max(0, progress.granted_ns)))
+
+    outcome = None
+    try:
+        outcome = launch(work, report)
+        facts = run_facts(outcome, work)
+        write_json(work / SUMMARY, summarise(Run(work, ended(base, facts, None))))
+    except BaseException as error:
+        salvage(work)
+        facts = run_facts(getattr(error, "outcome", outcome), work)
+        save_manifest(work, ended(base, facts, reason_of(error)))
+        raise
+    save_manifest(work, ended(base, facts, None))
+
+
+def run_task(work: Path, task: Task, launch: Launch, on_time: OnTime | None = None) -> None:
+    """Run a task in `work`, a folder to make, and move it to its own folder at the end.
+
+    Whatever stood there is replaced, but not by an interrupted run, and a finished run of the same
+    settings stays: another may have run the same point at the same time.
+
+    Raises:
+        TielineError: the run failed; its folder is marked incomplete.
+    """
+    check_version(task)
+    work.mkdir(parents=True)
+    try:
+        run_in(work, task, launch, on_time)
+    except TielineError:
+        put(work, Path(task.folder))
+        raise
+    except BaseException:
+        shutil.rmtree(work, ignore_errors=True)
+        raise
+    put(work, Path(task.folder))
+
+
+def work_folder(task: Task) -> Path:
+    """Return where a task is run before it has its place: beside it, and no other attempt's."""
+    folder = Path(task.folder)
+    return folder.with_name(f".{folder.name}.partial-{socket.gethostname()}-{os.getpid()}")
+
+
+def put(work: Path, folder: Path) -> None:
+    """Give a run that has ended its place; a finished run of the same settings goes first."""
+    if is_finished(folder, read_manifest(work)):
+        shutil.rmtree(work)
+        return
+    if folder.exists():
+        shutil.rmtree(folder)
+    work.rename(folder)
+
+
+def is_finished(folder: Path, wanted: Mapping[str, Any]) -> bool:
+    """Return whether a folder holds a complete run of the settings, inputs and version wanted.
+
+    Args:
+        folder: a run's, or one that does not exist.
+        wanted: a manifest of the run, complete or not.
+    """
+    if not is_result(folder) or not (folder / SUMMARY).is_file():
+        return False
+    found = read_manifest(folder)
+    return found["status"] == "complete" and _identity(found) == _identity(wanted)
+
+
+def mark_lost(work: Path, task: Task, reason: str) -> None:
+    """Keep what is left of a run whose own process is gone, marked incomplete with the reason."""
+    if not (work / MANIFEST).is_file():
+        shutil.rmtree(work, ignore_errors=True)
+        return
+    salvage(work)
+    save_manifest(work, ended(task.manifest, run_facts(None, work), reason))
+    put(work, Path(task.folder))
+
+
+def check_version(task: Task) -> None:
+    """Refuse to run what another version planned.
+
+    Raises:
+        CosimError: this host has another version of tieline.
+        InputError: the folder of the whole result is not seen from here.
+    """
+    planned = task.manifest["versions"]["tieline"]
+    if planned != tieline.__version__:
+        raise CosimError(
+            f"host {socket.gethostname()} has tieline {tieline.__version__}, but the sweep was"
+            f" planned by {planned}: install the same version on every host"
+        )
+    points = Path(task.folder).parent
+    if not points.is_dir():
+        raise InputError(
+            f"host {socket.gethostname()} sees no folder {points}: every worker must see the"
+            " result folder and the case under the same paths (a shared file system)"
+        )
+
+
+def reason_of(error: BaseException) -> str:
+    """Return why a run is incomplete."""
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted from the keyboard"
+    return str(error) if isinstance(error, TielineError) else f"{type(error).__name__}: {error}"
+
+
+def _identity(manifest: Mapping[str, Any]) -> tuple[Any, ...]:
+    version = manifest["versions"]["tieline"]
+    return manifest["run_id"], manifest["config_hash"], manifest["inputs"], version
