@@ -18,6 +18,7 @@ def stored() -> nbformat.NotebookNode:
 
 @pytest.mark.helics
 @pytest.mark.slow
+@pytest.mark.timeout(900)  # where nothing is compiled yet, it is the first to compile
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 def test_the_notebook_runs_to_its_end_and_says_what_it_says_in_the_repository(
     stored: nbformat.NotebookNode, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -25,7 +26,7 @@ def test_the_notebook_runs_to_its_end_and_says_what_it_says_in_the_repository(
     """A newcomer's first hour would end at a cell that fails, or shows other numbers."""
     monkeypatch.setenv("JUPYTER_PLATFORM_DIRS", "1")
     fresh = nbformat.from_dict(stored)
-    options = {"timeout": 280, "kernel_name": "python3", "resources": {"metadata": {"path": "."}}}
+    options = {"timeout": 800, "kernel_name": "python3", "resources": {"metadata": {"path": "."}}}
     monkeypatch.chdir(tmp_path)
     NotebookClient(fresh, **options).execute()
     assert (tmp_path / "results" / "near" / "manifest.json").is_file()
