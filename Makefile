@@ -7,15 +7,18 @@ PYTHON ?= $(shell for name in python3 python3.13 python3.12 python3.11; do \
 	$$name -c '$(IS_SUPPORTED)' 2>/dev/null && echo $$name && break; done)
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
-.PHONY: help demo test lint format docs wheel clean
+.PHONY: help demo test smoke lint format docs wheel lock image clean
 
 help:
 	@echo "make demo    run the trip of G26 under six delays, with a table and plots"
 	@echo "make test    run every test"
+	@echo "make smoke   run short federations over every core: does the chain work here?"
 	@echo "make lint    check style and types"
 	@echo "make format  bring every file into the house's format"
 	@echo "make docs    build the documentation as a site into build/site"
 	@echo "make wheel   build the wheel and the source distribution into dist/"
+	@echo "make lock    pin anew what the image installs (needs uv)"
+	@echo "make image   build the image tieline (needs docker)"
 	@echo "make clean   remove the environment and everything that was built"
 
 demo: $(VENV)/runtime
@@ -23,6 +26,9 @@ demo: $(VENV)/runtime
 
 test: $(VENV)/development
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+
+smoke: $(VENV)/development
+	$(BIN)/python -m pytest -m smoke
 
 lint: $(VENV)/development
 	$(BIN)/ruff check .
@@ -38,6 +44,18 @@ docs: $(VENV)/development
 
 wheel: $(VENV)/development
 	$(BIN)/python -m build
+
+# The versions are those of the environment that the tests ran in.
+LOCK := uv pip compile --quiet --python-version 3.12 --python-platform linux --generate-hashes \
+	--no-header --no-annotate --constraint $(VENV)/tested.txt
+
+lock: $(VENV)/development
+	$(BIN)/python -m pip freeze --exclude-editable > $(VENV)/tested.txt
+	$(LOCK) pyproject.toml --output-file docker/requirements.lock
+	echo hatchling | $(LOCK) - --output-file docker/build.lock
+
+image:
+	docker build --file docker/Dockerfile --tag tieline:latest .
 
 $(VENV)/created:
 	@test -n "$(PYTHON)" || { echo "tieline needs Python 3.11, 3.12 or 3.13; none was found" >&2; exit 1; }

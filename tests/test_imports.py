@@ -2,6 +2,9 @@
 
 import ast
 import re
+import subprocess
+import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -13,6 +16,7 @@ ROOT = Path(tieline.__file__).parent
 MODULES = sorted(ROOT.rglob("*.py"))
 
 
+@cache
 def imports(path: Path) -> set[str]:
     """Return the full names of what a module imports, wherever in it."""
     found: set[str] = set()
@@ -81,6 +85,32 @@ def test_what_reports_reads_result_folders_only(name: str) -> None:
     """A report that reached into a simulation could show what no folder holds."""
     names = imports(ROOT / "experiment" / f"{name}.py")
     assert not begins(names, "tieline.grid", "tieline.network", "tieline.cosim", "tieline.wams")
+
+
+def test_importing_tieline_imports_nothing_large() -> None:
+    """Otherwise every command and every federate would wait for what it never uses."""
+    script = (
+        "import sys; before = set(sys.modules); import tieline; tieline.TielineError;"
+        "print(*sorted({name.partition('.')[0] for name in set(sys.modules) - before}))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], check=True, capture_output=True, text=True
+    )
+    assert set(done.stdout.split()) <= {"tieline", *sys.stdlib_module_names}
+
+
+def test_no_part_of_the_package_takes_the_notebooks_names() -> None:
+    """The notebook's side stands on the rest; the other way round, two would need each other."""
+    for path in MODULES:
+        if path not in [*part("api"), ROOT / "__init__.py"]:
+            assert not begins(imports(path), "tieline.api"), path
+
+
+def test_a_notebook_starts_federates_and_does_not_import_them() -> None:
+    """A federate inside a notebook's process could not be killed when it hangs."""
+    for path in part("api"):
+        forbidden = ("tieline.grid.federate", "tieline.network.federate", "tieline.cosim")
+        assert not begins(imports(path), *forbidden), path
 
 
 @pytest.mark.parametrize("path", part("report"), ids=lambda path: path.name)

@@ -46,6 +46,7 @@ def core(name: str) -> tuple[str, str]:
     return (f"federation.core={name}", "federation.hang_timeout=60 s")
 
 
+@pytest.mark.smoke
 @pytest.mark.helics
 @pytest.mark.parametrize("name", ["inproc", "zmq", "tcp"])
 def test_every_core_gives_the_bits_of_the_run_without_helics(
