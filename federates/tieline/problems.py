@@ -219,7 +219,7 @@ def _shown(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def value_at(data: Any, path: Path) -> Any:
+def value_at(data: Any, path: Sequence[Any]) -> Any:
     """Return the value at a path, or None where the data do not have it."""
     for part in path:
         try:

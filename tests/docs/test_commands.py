@@ -1,28 +1,39 @@
 """Every command line of the documentation, as a reader would type it.
 
-Commands that simulate write the tables of a stand-in, as in `tests/test_cli.py`; everything else of
-them, and every other command, is real. A few are only parsed, each for the reason that it stands with.
+Commands that simulate run both federates in this process, for a second and a half at most, and draw
+no figures; everything else of them, and every other command, is as it is. A few are only parsed, each
+for the reason that it stands with.
 """
 
+import json
 import re
 import shlex
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 import typer
 from typer.testing import CliRunner
 
-from synthetic_result import fake_launch
+from synthetic_result import outcome
 from tieline.cli import app
 from tieline.cli import run as run_command
+from tieline.cosim.interfaces import Clock
+from tieline.cosim.local import run_local
+from tieline.experiment import report
+from tieline.experiment.launch import Outcome
 from tieline.experiment.sweep_run import InTurn
+from tieline.experiment.watch import Progress
+from tieline.grid.federate import open_participant as open_grid
+from tieline.network.federate import open_participant as open_network
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAGES = [page for page in PAGES if page.name != "cli_reference.md"]
 ZOO = ROOT / "tests" / "network" / "data" / "zoo"
+
+LONGEST_S = 1.5
 
 ONLY_PARSED = {
     r"^doctor": "tests/doctor runs its federation",
@@ -53,17 +64,29 @@ def parse(words: list[str]) -> None:
     group.commands[words[0]].make_context(words[0], words[1:])  # type: ignore[attr-defined]
 
 
+def launch(folder: Path, on_progress: Callable[[Progress], None]) -> Outcome:
+    """Run the federation of a folder for a short time."""
+    told = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    told["grid"]["duration"] = min(LONGEST_S, told["grid"]["duration"])
+    told["clock"]["intervals"] = round(told["grid"]["duration"] * told["clock"]["rate_hz"])
+    (folder / "run.json").write_text(json.dumps(told), encoding="utf-8")
+    grid, network = open_grid(told, folder), open_network(told, folder)
+    run_local(grid, network, Clock(**told["clock"]), lambda *_: None)
+    return outcome(told["grid"]["duration"])
+
+
 @pytest.fixture
-def _stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(run_command, "launcher", lambda: fake_launch)
-    monkeypatch.setattr(run_command, "sweep_runner", lambda *_: InTurn(fake_launch))
+def _short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(run_command, "launcher", lambda: launch)
+    monkeypatch.setattr(run_command, "sweep_runner", lambda *_: InTurn(launch))
+    monkeypatch.setattr(report, "draw", lambda *_: [])
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     for file in ZOO.glob("*.graphml"):
         shutil.copy(file, tmp_path / "Geant.graphml")
 
 
-@pytest.mark.usefixtures("_stand_in")
+@pytest.mark.usefixtures("_short")
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_every_command_of_a_page_works(page: Path) -> None:
     """A reader who types what the page says must not be the first to do so."""

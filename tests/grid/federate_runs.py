@@ -35,6 +35,7 @@ def opened(
         "grid": {"duration": 0.1, "pss": PSS, **(grid or {})},
         "wams": wams or {},
         "network": {"delay": delay},
+        "federation": {},
         "destinations": destinations,
     }
     return open_participant(run, folder)

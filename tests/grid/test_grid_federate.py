@@ -308,6 +308,7 @@ def test_units_without_a_controller_believe_in_synchronous_speed(
         "grid": {"duration": 0.1, "pss": {**PSS, "units": ["G2", "G9"]}},
         "wams": {"sensors": [61, 2], "weights": [3.0, 1.0]},
         "network": {"delay": None},
+        "federation": {},
         "destinations": [
             {"name": "ctl00", "unit": "G2", "bus": 3},
             {"name": "ctl01", "unit": "G9", "bus": 0},

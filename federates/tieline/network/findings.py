@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from tieline.errors import InputError
 from tieline.network.entry import Entry
 from tieline.network.schema import TAGGED, allowed_keys
+from tieline.problems import value_at
 from tieline.yaml_lines import Document, Position
 
 AnEntry = TypeVar("AnEntry", bound=Entry)
@@ -116,7 +117,10 @@ class Findings:
             self.add((*position, *inner), f"{name} lacks '{missing}'")
         else:
             reason = _reason(detail)
-            given = "" if "(got " in reason else f" (got {_shown(detail['input'])})"
+            # As the file says it: what pydantic was handed may be converted by then.
+            stated = value_at(self.document.data, (*position, *inner))
+            value = detail["input"] if isinstance(stated, dict | list | None) else stated
+            given = "" if "(got " in reason else f" (got {_shown(value)})"
             self.add((*position, *inner), f"{name} {reason}{given}")
 
     def _existing(self, position: Position, location: tuple[Any, ...]) -> Position:
