@@ -46,17 +46,21 @@ def test_a_trace_is_found_beside_its_experiment(tmp_path: Path) -> None:
     assert set(result.table("flows")["delay_max_s"]) == {0.1}
 
 
+@pytest.fixture(scope="module")
+def constant(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Return a run of the constant engine."""
+    settings = (*SHORT, "network.delay=50 ms", "network.engine=constant", *core("local"))
+    return run("g26_trip_smoke", tmp_path_factory.mktemp("constant") / "c", *settings)
+
+
 @pytest.mark.helics
 @pytest.mark.parametrize("name", ["local", "inproc", "zmq"])
-def test_helics_filters_give_the_run_of_the_constant_engine(name: str, tmp_path: Path) -> None:
+def test_helics_filters_give_the_run_of_the_constant_engine(
+    name: str, constant: Run, tmp_path: Path
+) -> None:
     """Otherwise what is compared with HELICS's filters would be compared with something else."""
-    delay = (*SHORT, "network.delay=50 ms")
-    filtered = run(
-        "g26_trip_smoke", tmp_path / "f", *delay, "network.engine=helics-filters", *core(name)
-    )
-    constant = run(
-        "g26_trip_smoke", tmp_path / "c", *delay, "network.engine=constant", *core("local")
-    )
+    settings = (*SHORT, "network.delay=50 ms", "network.engine=helics-filters", *core(name))
+    filtered = run("g26_trip_smoke", tmp_path / "f", *settings)
     assert hashes(filtered) == hashes(constant)
 
 
