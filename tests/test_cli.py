@@ -172,7 +172,9 @@ def test_a_failed_run_exits_with_the_code_of_its_error(
 
 def test_a_folder_with_other_files_is_refused_before_anything_starts() -> None:
     """Otherwise a run would end in a refusal after its work was done."""
-    result = call("run", "tiny.yaml", *SETTINGS, "--out", ".")
+    Path("notes").mkdir()
+    Path("notes/mine.txt").write_text("")
+    result = call("run", "tiny.yaml", *SETTINGS, "--out", "notes")
     assert result.exit_code == 2
     assert "no result of tieline" in result.stderr
 

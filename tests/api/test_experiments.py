@@ -115,3 +115,11 @@ def test_what_is_shipped_is_listed() -> None:
     """Otherwise a newcomer could not know what there is to run."""
     assert "Alberta" in tieline.cases().loc["miniwecc", "title"]
     assert tieline.experiments().loc["g26_trip", "question"].endswith("?")
+
+
+def test_a_group_that_is_one_thing_is_replaced_and_a_sweep_is_a_block() -> None:
+    """Otherwise a queue of one kind would keep words of another, and no block could be given."""
+    stated = options({"network": {"queue": {"discipline": "red", "packets": 50}}})
+    assert [text.partition("=")[0] for text in stated] == ["network.queue"]
+    block = {"method": "grid", "over": {"grid.pss.gain": [1, 2]}}
+    assert [text.partition("=")[0] for text in options({"sweep": block})] == ["sweep"]

@@ -189,8 +189,22 @@ def test_progress_is_simulated_time_of_each_point(tmp_path: Path) -> None:
     assert heard == [("ideal", 20.5), ("ideal", 41.0), ("0.25-s", 20.5), ("0.25-s", 41.0)]
 
 
-def test_an_unnamed_result_goes_to_results_with_its_time() -> None:
-    """Otherwise runs would overwrite each other."""
-    target = default_target("tiny")
-    assert target.parent == Path("results")
-    assert target.name.startswith("tiny-")
+def test_unnamed_results_go_to_results_each_to_a_folder_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Otherwise runs that are started in one second would overwrite each other."""
+    monkeypatch.chdir(tmp_path)
+    targets = [default_target("tiny") for _ in range(3)]
+    assert len(set(targets)) == 3
+    assert {target.parent for target in targets} == {Path("results")}
+    assert all(target.name.startswith("tiny-") and target.is_dir() for target in targets)
+
+
+@pytest.mark.parametrize("name", [".", ".."])
+def test_the_working_folder_is_no_place_for_a_result(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Otherwise a run would be lost at its end, when its folder cannot take the name."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="give one inside"):
+        check_target(Path(name))

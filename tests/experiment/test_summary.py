@@ -4,6 +4,7 @@ import csv
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from synthetic_result import (
@@ -24,6 +25,7 @@ from tieline.experiment.run import execute
 from tieline.experiment.sites import Sites
 from tieline.experiment.summary import summarise
 from tieline.experiment.table import FIELDS, shown, write_csv
+from tieline.tables import Column, write_table
 
 
 def run_of(tmp_path: Path, *settings: str, text: str = EXPERIMENT) -> Run:
@@ -162,3 +164,27 @@ def test_a_missing_number_is_a_dash() -> None:
     summary = {"delay": {"mean_s": None}}
     assert shown(summary, FIELDS[0]) == "-"
     assert shown({"delay": {"mean_s": 0.1}}, FIELDS[0]) == "100.0"
+
+
+def test_a_run_that_ends_before_any_event_has_a_summary(tmp_path: Path) -> None:
+    """Too much gain is an answer: a run that loses stability by itself must not end as a fault."""
+
+    def unstable(folder: Path, on_progress: Any) -> Any:
+        done = fake_launch(folder, on_progress)
+        columns = [
+            Column("t_s", "s", "instant"),
+            Column("what", "", "event", "str"),
+            Column("is_ending", "", "1 if the run ended with it", "int64"),
+        ]
+        log = {
+            "t_s": np.array([41.1]),
+            "what": np.array(["synchronism lost"], dtype=object),
+            "is_ending": np.array([1]),
+        }
+        write_table(folder / "events.parquet", columns, log)
+        return done
+
+    folder = execute(plan_of(tmp_path), tmp_path / "out", unstable)
+    summary = read_runs(folder)[0].summary()
+    assert summary["ending"].startswith("synchronism lost")
+    assert summary["frequency"]["nadir_hz"] == pytest.approx(60 * NADIR_PU, abs=1e-3)

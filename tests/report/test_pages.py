@@ -4,12 +4,18 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from synthetic_result import CONSTANT, EXPERIMENT, SWEEP, fake_launch, plan_of
+from tieline.experiment.results import read_runs
 from tieline.experiment.run import execute
 from tieline.report import write_pages
 from tieline.report.html import data_block, element, text
+from tieline.report.network_tables import controllers_table
+from tieline.report.store import Store
+from tieline.report.traffic_curves import put_traffic
 
 
 class Links(HTMLParser):
@@ -101,3 +107,40 @@ def test_a_run_that_failed_has_a_page_of_what_it_wrote(tmp_path: Path) -> None:
     page = write_pages(tmp_path / "out").read_text(encoding="utf-8")
     assert "Incomplete: grid &lt;died&gt;" in page
     assert "Rotor speeds" in page
+
+
+def test_idle_windows_of_links_keep_their_place_in_time(tmp_path: Path) -> None:
+    """Otherwise a delay would be drawn where another window's was, or an idle link as busy."""
+    execute(plan_of(tmp_path), tmp_path / "out", fake_launch)
+    series = {
+        "controller_series": {"t_s": [0.0, 0.1, 0.2, 0.3], "unit": ["G34"] * 4,
+                              "delay_mean_s": [0.1, 0.2, 0.3, 0.4]},
+        "link_series": {"t_s": [0.0, 0.3], "from": ["a"] * 2, "to": ["b"] * 2,
+                        "utilisation": [0.5, 0.25], "max_queue": [1, 2], "dropped_queue": [0, 1],
+                        "dropped_loss": [0, 0], "dropped_down": [0, 0]},
+    }  # fmt: skip
+    for name, columns in series.items():
+        pd.DataFrame(columns).to_parquet(tmp_path / "out" / f"{name}.parquet")
+    store = Store()
+    put_traffic(store, read_runs(tmp_path / "out")[0])
+    assert store.axes["window"] == [0.0, 0.1, 0.2, 0.3]
+    lengths = {name: store.tables[name]["length"] for name in ("delay", "load", "queue")}
+    assert lengths == {"delay": 4, "load": 4, "queue": 4}
+
+
+def test_a_controller_that_nothing_reached_has_no_delay() -> None:
+    """Otherwise the one behind a cut link would seem the fastest."""
+    flows = pd.DataFrame(
+        {
+            "unit": ["G21", "G34"],
+            "sent": [10, 10],
+            "in_flight": [0, 0],
+            "delivered": [0, 10],
+            "delay_mean_s": [np.nan, 0.1],
+            "delay_p95_s": [np.nan, 0.2],
+            "delay_max_s": [np.nan, 0.2],
+        }
+    )
+    rows = str(controllers_table(flows, pd.DataFrame()))
+    assert rows.index("G21") < rows.index("G34")
+    assert "0.0<" not in rows[rows.index("G21") : rows.index("G34")]

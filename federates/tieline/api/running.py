@@ -80,14 +80,15 @@ class Experiment:
             InputError: `out` holds something else, or no such jobs or scheduler can be.
             TielineError: a run failed; what it wrote is kept, marked incomplete.
         """
-        target = _free_target(self.name) if out is None else Path(out)
+        if out is not None:
+            check_target(Path(out))
+        target = default_target(self.name) if out is None else Path(out)
         tell = self._lines() if progress is True else progress or None
 
         def on_progress(point: Point, time_s: float) -> None:
             if tell is not None:
                 tell(self._label(point), time_s)
 
-        check_target(target)
         if not self.plan.study.is_sweep:
             return Result(execute(self.plan, target, launch, on_progress))
         runner = runner_of(self.plan, jobs, scheduler)
@@ -174,12 +175,14 @@ def experiments() -> pd.DataFrame:
 
 def _from_content(content: Mapping[str, Any], chosen: list[str]) -> Experiment:
     """Return the experiment of a dictionary; paths in it count from the working folder."""
-    with tempfile.TemporaryDirectory(prefix="tieline-") as folder:
-        path = Path(folder) / "experiment.yaml"
-        try:
-            path.write_text(yaml.safe_dump(dict(content), sort_keys=False), encoding="utf-8")
-        except yaml.YAMLError as error:
-            raise InputError(f"the experiment holds what no YAML file can: {error}") from error
+    try:
+        text = yaml.safe_dump(dict(content), sort_keys=False)
+    except yaml.YAMLError as error:
+        raise InputError(f"the experiment holds what no YAML file can: {error}") from error
+    with tempfile.NamedTemporaryFile("w", prefix=".tieline-", suffix=".yaml", dir=".") as file:
+        file.write(text)
+        file.flush()
+        path = Path(file.name).resolve()
         try:
             return Experiment(prepare(with_core(load_experiment(str(path), chosen))))
         except InputError as error:
@@ -188,16 +191,5 @@ def _from_content(content: Mapping[str, Any], chosen: list[str]) -> Experiment:
 
 def _without_file(finding: str, path: Path) -> str:
     """Return a finding without the place of a file that the user never saw."""
-    before, found, after = finding.partition(f"{path.name}:")
-    if not found or not before.endswith(f"{path.parent.name}/"):
-        return finding
-    return after.partition(": ")[2]
-
-
-def _free_target(name: str) -> Path:
-    """Return a folder that no earlier run of the same second has taken."""
-    first = default_target(name)
-    target, number = first, 2
-    while target.exists():
-        target, number = first.with_name(f"{first.name}-{number}"), number + 1
-    return target
+    _, found, after = finding.partition(f"{path.name}:")
+    return after.partition(": ")[2] if found else finding

@@ -8,6 +8,8 @@ from typing import Any
 import yaml
 
 from tieline.errors import InputError
+from tieline.experiment.layers import REPLACED
+from tieline.experiment.overrides import path_of
 
 _OPTION = re.compile(r"^--set (?=\S)")
 
@@ -41,7 +43,7 @@ def without_options(error: InputError) -> InputError:
 def _flat(group: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
     for key, value in group.items():
         path = f"{before}{key}"
-        if isinstance(value, Mapping) and value:
+        if isinstance(value, Mapping) and value and path_of(path) not in REPLACED:
             yield from _flat(value, f"{path}.")
         else:
             yield path, value

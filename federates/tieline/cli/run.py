@@ -160,11 +160,12 @@ def run_sweep_plan(
     from tieline.experiment.run import check_target, default_target
     from tieline.experiment.sweep_run import PointsFailedError, run_sweep
 
-    target = out or default_target(study.name)
-    check_target(target)
+    if out is not None:
+        check_target(out)
     console = Console(quiet=quiet or as_json)
     plan = prepared(study)
     runner = sweep_runner(plan, jobs, scheduler)
+    target = out or default_target(study.name)
     console.print(study.question, markup=False, highlight=False, soft_wrap=True)
     try:
         with shown_progress(study.points, console) as listener:

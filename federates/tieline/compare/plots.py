@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from tieline.compare.quantities import TABLE, TIME, Quantity
 from tieline.errors import InputError
-from tieline.experiment.results import Run
+from tieline.experiment.results import Run, common_events
 from tieline.figures import STYLE, colours
 
 FORMATS = (".png", ".svg", ".pdf")
@@ -102,7 +102,7 @@ def _panel(
     axes.margins(x=0)
     axes.ticklabel_format(useOffset=False)
     _legend(axes, len(runs) * len(quantities))
-    _mark_events(axes, runs[0], window_s)
+    _mark_events(axes, common_events(runs), window_s)
 
 
 def _bounds(window_s: Window) -> tuple[float, float]:
@@ -135,8 +135,8 @@ def _legend(axes: Axes, curves: int) -> None:
         axes.set_title(f"{curves} curves", loc="right", fontsize=8.0, color="0.35")
 
 
-def _mark_events(axes: Axes, run: Run, window_s: Window) -> None:
+def _mark_events(axes: Axes, events: Sequence[tuple[float, str]], window_s: Window) -> None:
     first, last = _bounds(window_s)
-    for at_s, _ in run.events():
+    for at_s, _ in events:
         if first <= at_s <= last:
             axes.axvline(at_s, color="0.6", linewidth=0.8, linestyle=":")

@@ -25,8 +25,11 @@ from tieline.experiment.watch import Progress, Suspect, Watch
 
 Say = Callable[[str], None]
 
+_HELLO_S = 2.0
+"""Who connects says hello at once; meanwhile those who have joined hear nothing."""
 _ANSWER_S = 5.0
-_OVER_S = 30.0
+_OVER_S = 3600.0
+"""The other side may have much to write; a broker that dies is noticed at once all the same."""
 _PATIENCE = 20.0
 """How much longer a single federate waits than the broker, which hears both and ends a run."""
 
@@ -189,7 +192,7 @@ def _is_there(wire: Wire) -> bool:
 def _examined(wire: Wire, planned: PlannedRun, wires: dict[str, Wire], say: Say) -> str | None:
     """Return the name of a federate that may join; answer it either way."""
     try:
-        theirs = wire.wait(_ANSWER_S)
+        theirs = wire.wait(_HELLO_S)
     except CosimError as error:
         say(f"somebody at {wire.other_address} said nothing: {error}")
         wire.close()

@@ -172,12 +172,14 @@ class Processes:
         for name, command in starts:
             if name in FEDERATES and any(other in FEDERATES for other in self._children):
                 time.sleep(stagger_s)
-            self._start_one(name, command, self._start_process)
+            self._start_one(name, command, self._start_process, has_word=True)
 
-    def _start_one(self, name: str, command: Sequence[str], start: Start) -> None:
+    def _start_one(
+        self, name: str, command: Sequence[str], start: Start, *, has_word: bool
+    ) -> None:
         log = self._folder / "logs" / f"{name}.log"
         try:
-            self._children[name] = Child(name, command, log, start)
+            self._children[name] = Child(name, command, log, start, has_word)
         except OSError as error:
             self._fail(Suspect(name, f"could not be started: {error}", CosimError.exit_code))
 
@@ -186,7 +188,8 @@ class Processes:
         while self._guests and self._watch.is_opened():
             guest = self._guests.pop()
             start = partial(executed, directory=guest.directory)
-            self._start_one(guest.name, guest.command, start)
+            # What a guest prints is no word of a federate about itself.
+            self._start_one(guest.name, guest.command, start, has_word=False)
 
     def _follow(self) -> None:
         before_s = time.monotonic()

@@ -199,16 +199,30 @@ def _with_own_files(data: dict[Any, Any], folder: pathlib.Path) -> dict[Any, Any
     for path in _FILES:
         _make_absolute(value_at(changed, path[:-1]) if path[:-1] else changed, [path[-1]], folder)
     points = changed.get("sweep")
+    keys = [".".join(map(str, path)) for path in _FILES]
     for point in points if isinstance(points, list) else []:
-        _make_absolute(point, [".".join(map(str, path)) for path in _FILES], folder)
+        _make_absolute(point, keys, folder)
+    if isinstance(points, dict):
+        _make_absolute(points.get("over"), keys, folder)
     return changed
 
 
 def _make_absolute(group: Any, keys: Iterable[str | int], folder: pathlib.Path) -> None:
     for key in keys if isinstance(group, dict) else ():
-        name = group.get(key)
-        if isinstance(name, str) and (folder / name).exists():
-            group[key] = str(folder / name)
+        if key in group:
+            group[key] = _absolute(group[key], folder)
+
+
+def _absolute(name: Any, folder: pathlib.Path) -> Any:
+    """Return a name, or each of several to choose from, as a path if it is one in the folder."""
+    if isinstance(name, list):
+        return [_absolute(each, folder) for each in name]
+    if isinstance(name, dict) and isinstance(name.get("choice"), list):
+        return name | {"choice": _absolute(name["choice"], folder)}
+    is_there = isinstance(name, str) and any(
+        path.is_file() for path in (folder / name, folder / name / "case.yaml")
+    )
+    return str(folder / name) if is_there else name
 
 
 def _has(data: Any, path: Path) -> bool:

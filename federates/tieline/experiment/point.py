@@ -103,14 +103,18 @@ def run_task(work: Path, task: Task, launch: Launch, on_time: OnTime | None = No
     settings stays: another may have run the same point at the same time.
 
     Raises:
-        TielineError: the run failed; its folder is marked incomplete.
+        TielineError: the run failed; its folder is marked incomplete. The same holds for any other
+            error.
     """
     check_version(task)
     work.mkdir(parents=True)
     try:
         run_in(work, task, launch, on_time)
-    except TielineError:
-        put(work, Path(task.folder))
+    except Exception:
+        if is_result(work):
+            put(work, Path(task.folder))
+        else:
+            shutil.rmtree(work, ignore_errors=True)
         raise
     except BaseException:
         shutil.rmtree(work, ignore_errors=True)

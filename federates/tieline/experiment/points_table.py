@@ -66,7 +66,8 @@ def spread(folder: Path) -> pd.DataFrame:
     rows = {}
     for name in table.columns:
         values = table[name].dropna()
-        if name in (*FIRST, *swept) or values.empty or values.dtype != "float64":
+        is_number = pd.api.types.is_numeric_dtype(values) and values.dtype != "bool"
+        if name in (*FIRST, *swept) or values.empty or not is_number:
             continue
         labels = table["label"].to_numpy()[values.index]
         least, greatest = values.to_numpy().argmin(), values.to_numpy().argmax()

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -86,6 +86,12 @@ class Run:
         """Return the units that an event trips; they go on alone and count in no average."""
         events = self.config["grid"]["events"]
         return {event["trip_generator"] for event in events if "trip_generator" in event}
+
+
+def common_events(runs: Sequence[Run]) -> list[tuple[float, str]]:
+    """Return the events that all runs have, as (instant in s, what happens), in order of time."""
+    logs = [run.events() for run in runs]
+    return [event for event in logs[0] if all(event in log for log in logs)] if logs else []
 
 
 def read_json(path: Path) -> Any:

@@ -1,5 +1,6 @@
 """Runs a plan: one folder a run, named in the end, marked for what it is when it fails."""
 
+import itertools
 import os
 import shutil
 from collections.abc import Callable
@@ -17,16 +18,32 @@ __all__ = ["Launch", "RunFailedError", "check_target", "default_target", "execut
 
 
 def default_target(name: str) -> Path:
-    """Return a folder of its own for a run that names none."""
-    return Path("results") / f"{name}-{datetime.now().strftime('%Y%m%d-%H%M%S')}"
+    """Make and return a folder of its own, empty, for a run that names none.
+
+    Raises:
+        InputError: there is no place for it.
+    """
+    first = Path("results") / f"{name}-{datetime.now().strftime('%Y%m%d-%H%M%S')}"
+    for number in itertools.count(1):
+        target = first if number == 1 else first.with_name(f"{first.name}-{number}")
+        try:
+            target.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise InputError(f"{target} cannot be written ({error.strerror})") from error
+        return target
+    raise AssertionError("counting ends nowhere")
 
 
 def check_target(target: Path) -> None:
     """Refuse a target that would overwrite what is no result.
 
     Raises:
-        InputError: the target is a file, or a folder with something else in it.
+        InputError: the target is a file, a folder with something else in it, or one around here.
     """
+    if target.resolve() in (Path.cwd(), *Path.cwd().parents):
+        raise InputError(f"--out {target} is the folder you are in, or around it: give one inside")
     if target.exists() and not target.is_dir():
         raise InputError(f"--out {target} is a file: give a folder")
     if target.is_dir() and any(target.iterdir()) and not is_result(target):

@@ -32,6 +32,7 @@ seed: 1                       # of all that is random; another seed, another run
 
 grid:
   duration: {duration} s              # simulated time
+  steps_per_second: {steps}     # of integration; a multiple of wams.reporting
   pss:
     model: generalized        # tieline models pss lists all; none switches them off
     gain: {gain}                   # K, pu on each machine's base
@@ -112,6 +113,7 @@ def starter(name: str, case: str, folder: Path) -> str:
         duration=20,
         gain=9,
         reporting=found.base.frequency_Hz,
+        steps=4 * 60 if found.base.frequency_Hz == 60 else 6 * 50,
         editor=editor_line(_schema_for(folder)),
         network=network,
         swept="network.mean_delay" if networks else "network.delay",

@@ -48,7 +48,9 @@ def summarise(run: Run) -> dict[str, Any]:
 def _frequency(run: Run, grid: pd.DataFrame, nominal_hz: float) -> dict[str, Any]:
     """Nadir after the first event and settling value of the centre-of-inertia frequency."""
     time_s, frequency_hz = _values(grid, "t_s"), nominal_hz * _values(grid, "coi_pu")
-    start_s = min((at for at, _ in run.events()), default=time_s[0])
+    # The ending of a run without a future is logged last; nothing is recorded from it on.
+    events = run.events()[:-1] if run.ending() is not None else run.events()
+    start_s = min(min((at for at, _ in events), default=time_s[0]), time_s[-1])
     after = np.flatnonzero(time_s >= start_s)
     nadir = after[np.argmin(frequency_hz[after])]
     span_s = time_s[-1] - start_s

@@ -108,6 +108,7 @@ class Child:
         command: the program and its arguments.
         log: where its standard error, and whatever else it says, is kept.
         start: how the process comes to be.
+        has_word: whether its standard output is a federate's, with words about itself.
 
     Attributes:
         exit_code: None while it runs; negative for the signal that killed it.
@@ -115,15 +116,25 @@ class Child:
     """
 
     def __init__(
-        self, name: str, command: Sequence[str], log: Path, start: Start = executed
+        self,
+        name: str,
+        command: Sequence[str],
+        log: Path,
+        start: Start = executed,
+        has_word: bool = True,
     ) -> None:
         self.name = name
         self.exit_code: int | None = None
         self.reason: str | None = None
         self.use: ProcessUse | None = None
         self._peak_bytes = 0
-        self._process = start(command, child_environment())
+        self._has_word = has_word
         self.log = Log(log)
+        try:
+            self._process = start(command, child_environment())
+        except BaseException:
+            self.log.close()
+            raise
         assert self._process.stdout is not None
         assert self._process.stderr is not None
         self._pending = {self._process.stdout.fileno(): b"", self._process.stderr.fileno(): b""}
@@ -145,7 +156,8 @@ class Child:
         """Yield the JSON lines that have come; everything else goes to the log."""
         for descriptor in tuple(self._pending):
             for line in self._lines(descriptor):
-                message = _parsed(line) if descriptor == self._stdout else None
+                is_word = self._has_word and descriptor == self._stdout
+                message = _parsed(line) if is_word else None
                 if message is None:
                     self.log.write(line)
                 else:

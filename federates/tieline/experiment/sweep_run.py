@@ -114,6 +114,8 @@ class InTurn:
                 run_task(work_folder(task), task, self._launch, partial(on_time, i))
             except TielineError as error:
                 yield Ended(i, error)
+            except Exception as error:
+                yield Ended(i, TielineError(reason_of(error)))
             else:
                 yield Ended(i)
 

@@ -1,5 +1,7 @@
 """Writes the tables of a page's network: what links dropped, and what controllers waited for."""
 
+import math
+
 import pandas as pd
 
 from tieline.report.html import Html, details, element, table
@@ -47,11 +49,14 @@ def controllers_table(flows: pd.DataFrame, ages: pd.DataFrame) -> Html:
     rows = []
     for unit, own in flows.groupby("unit", sort=False):
         ended = own["sent"].sum() - own["in_flight"].sum()
-        weights = own["delivered"].clip(lower=1e-9)
-        mean = (own["delay_mean_s"].fillna(0) * weights).sum() / weights.sum()
+        arrived = own["delivered"].sum()
+        total = (own["delay_mean_s"].fillna(0) * own["delivered"]).sum()
+        mean = total / arrived if arrived else math.inf
         figures = (mean, own["delay_p95_s"].max(), own["delay_max_s"].max(), age.get(unit))
         loss = 100 * (1 - own["delivered"].sum() / ended) if ended else 0.0
-        cells = ["-" if v is None or pd.isna(v) else f"{1e3 * v:.1f}" for v in figures]
+        cells = [
+            "-" if v is None or pd.isna(v) or v == math.inf else f"{1e3 * v:.1f}" for v in figures
+        ]
         rows.append((-mean, (str(unit), *cells, f"{loss:.2f}")))
     heads = ("controller of", "mean delay, ms", "p95 of its slowest PMU, ms", "longest delay, ms",
              "oldest data, ms", "lost, %")  # fmt: skip

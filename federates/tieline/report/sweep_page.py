@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tieline.experiment.results import POINTS, Run
+from tieline.experiment.results import POINTS, Run, common_events
 from tieline.report import facts
 from tieline.report.html import Html, details
 from tieline.report.page import PAGE, charts, note, write_page
@@ -39,11 +39,11 @@ def write_sweep_page(
     data = store.data() | {
         "drawing": None,
         "areas": [],
-        "events": complete[0].events() if complete else [],
+        "events": common_events(complete),
         "focus": None,
         "begin_s": 0.0,
     }
-    missing = len(runs) - sum(page is not None for page in pages)
+    missing = sum(page is None and run.is_complete for run, page in zip(runs, pages, strict=True))
     said = f"{missing} points have no page: `tieline report` of a point's folder writes it."
     answer = Html(facts.comparison(runs, pages) + (note(said) if missing else ""))
     drawn = charts([chart.name for chart in store.charts])

@@ -16,9 +16,12 @@ MOST_BARS = 160
 
 def put_traffic(store: Store, run: Run) -> None:
     """Add what the network's tables of a run hold to a page."""
-    _put_controllers(store, run)
+    controllers, links = run.table("controller_series"), run.table("link_series")
+    # Links that carried nothing have no row: their windows are known from the controllers.
+    windows = _windows(controllers, links)
+    _put_controllers(store, run, controllers, windows)
     _put_distribution(store, run.table("delays"))
-    _put_links(store, run.table("link_series"))
+    _put_links(store, links, windows)
 
 
 def directions(series: pd.DataFrame) -> list[tuple[str, str]]:
@@ -27,14 +30,19 @@ def directions(series: pd.DataFrame) -> list[tuple[str, str]]:
     return sorted(zip(pairs["from"], pairs["to"], strict=True))
 
 
-def _put_controllers(store: Store, run: Run) -> None:
-    series = run.table("controller_series")
+def _windows(*tables: pd.DataFrame) -> Floats:
+    """Return the instants (m,) of all windows that some table has a row of."""
+    found = [table["t_s"].to_numpy(dtype=np.float64) for table in tables if not table.empty]
+    return np.unique(np.concatenate([np.zeros(0), *found]))
+
+
+def _put_controllers(store: Store, run: Run, series: pd.DataFrame, windows: Floats) -> None:
     if series.empty:
         return
     unit_areas, _ = areas_of(run.map())
     units = list(dict.fromkeys(series["unit"]))
     wide = series.pivot(index="t_s", columns="unit", values="delay_mean_s")[units]
-    windows = wide.index.to_numpy(dtype=np.float64)
+    wide = wide.reindex(windows)
     store.put("delay", "window", windows, 1e3 * wide.to_numpy(dtype=np.float64).T)
     curves = [Curve(u, "delay", i, unit_areas.get(u) or "units", u) for i, u in enumerate(units)]
     store.charts.append(
@@ -75,7 +83,7 @@ def _rebinned(counts: pd.DataFrame) -> tuple[Floats, Floats]:
     return 1e3 * edges, 100 * heights / heights.sum()
 
 
-def _put_links(store: Store, series: pd.DataFrame) -> None:
+def _put_links(store: Store, series: pd.DataFrame, windows: Floats) -> None:
     """Add load, longest queue and drops of every direction, and charts of the busiest."""
     if series.empty:
         return
@@ -83,7 +91,6 @@ def _put_links(store: Store, series: pd.DataFrame) -> None:
     # Groups are numbered in the order of their sorted keys, which is that of the pairs.
     ways = series.groupby(["from", "to"], sort=True).ngroup()
     series = series.assign(dropped=series[list(DROPS)].sum(axis=1), way=ways)
-    windows = np.array(sorted(set(series["t_s"])), np.float64)
     load = 100 * _wide(series, "utilisation", windows, len(pairs))
     queue = _wide(series, "max_queue", windows, len(pairs))
     store.put("load", "window", windows, load)

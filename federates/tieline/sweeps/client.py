@@ -141,9 +141,11 @@ class Nursery:
         elif "error" in line:
             order.said.append(line["error"])
         else:
+            # First, since an order that is no longer listed would be waited for for ever.
+            error = _error(order, line["exit_code"])
             with self._lock:
                 del self._orders[line["id"]]
-            order.events.put(Done(order.tag, _error(order, line["exit_code"])))
+            order.events.put(Done(order.tag, error))
 
     @staticmethod
     def _orphan(order: _Order) -> None:

@@ -19,7 +19,6 @@ from tieline.experiment.point import Task, is_finished
 from tieline.experiment.sweep_run import Ended, OnTime
 from tieline.sweeps.client import Done, Events, Nursery
 
-_PLUGIN = "tieline"
 _CONNECT_S = 20.0
 _ATTEMPTS = 3
 _FORGET_S = 1.0
@@ -52,13 +51,14 @@ class DaskCluster:
             InputError: there is no scheduler at the address.
             CosimError: the workers cannot load tieline.
         """
-        plugin = PointsPlugin(self._core, tasks[0].files["run.json"])
         sweep = uuid.uuid4().hex
+        plugin = PointsPlugin(self._core, tasks[0].files["run.json"], f"tieline-{sweep}")
         with _connected(self._address) as client, _installed(client, plugin):
             places = {}
             for i, task in enumerate(tasks):
                 key = f"tieline-{sweep}-{i}"
-                places[client.submit(run_point, task.to_json(), key=key, pure=False)] = i
+                order = client.submit(run_point, task.to_json(), plugin.name, key=key, pure=False)
+                places[order] = i
             try:
                 for future in as_completed(places, loop=client.loop):
                     yield Ended(places[future], _error_of(future))
@@ -72,11 +72,11 @@ class PointsPlugin(WorkerPlugin):
     Args:
         core: of the federations.
         rehearsal: content of the run file that is rehearsed.
+        name: of the sweep, so that two sweeps on one cluster have a nursery each.
     """
 
-    name = _PLUGIN
-
-    def __init__(self, core: str, rehearsal: Mapping[str, Any]) -> None:
+    def __init__(self, core: str, rehearsal: Mapping[str, Any], name: str) -> None:
+        self.name = name
         self._core = core
         self._rehearsal = rehearsal
 
@@ -114,9 +114,9 @@ class PointsPlugin(WorkerPlugin):
         return event
 
 
-def run_point(task: Mapping[str, Any]) -> Told:
-    """Run one task on a Dask worker."""
-    plugin: PointsPlugin = get_worker().plugins[_PLUGIN]
+def run_point(task: Mapping[str, Any], name: str) -> Told:
+    """Run one task of a sweep on a Dask worker."""
+    plugin: PointsPlugin = get_worker().plugins[name]
     return plugin.run(Task(**task))
 
 
@@ -149,7 +149,7 @@ def _installed(client: Client, plugin: PointsPlugin) -> Iterator[None]:
     try:
         yield
     finally:
-        client.unregister_worker_plugin(_PLUGIN)
+        client.unregister_worker_plugin(plugin.name)
 
 
 def _unfit(error: Exception) -> CosimError:
