@@ -177,15 +177,16 @@ class Choice(Axis):
 class _Spaced(Axis):
     """Values at set distances between two ends, both included."""
 
-    count: Count = Field(description="how many values")
-
     def at(self, share: float) -> Any:
         """Return one of the values."""
-        return self._value(int(share * self.count))
+        return self._value(int(share * self._size()))
 
     def values(self) -> tuple[Any, ...]:
         """Return all values."""
-        return tuple(self._value(i) for i in range(self.count))
+        return tuple(self._value(i) for i in range(self._size()))
+
+    def _size(self) -> int:
+        raise NotImplementedError
 
     def _value(self, i: int) -> Any:
         raise NotImplementedError
@@ -195,11 +196,15 @@ class Linspace(_Spaced):
     """Values at equal distances, both ends included."""
 
     linspace: Ends = Field(description="first and last value")
+    count: Count = Field(description="how many values")
 
     @model_validator(mode="after")
     def _is_range(self) -> Self:
         _ordered(self.linspace)
         return self
+
+    def _size(self) -> int:
+        return self.count
 
     def _value(self, i: int) -> Any:
         (low, high), unit = common(self.linspace)
@@ -210,11 +215,15 @@ class Logspace(_Spaced):
     """Values in equal ratios, both ends included."""
 
     logspace: Ends = Field(description="first and last value, above 0")
+    count: Count = Field(description="how many values")
 
     @model_validator(mode="after")
     def _is_range(self) -> Self:
         _ordered(self.logspace, above_zero=True)
         return self
+
+    def _size(self) -> int:
+        return self.count
 
     def _value(self, i: int) -> Any:
         (low, high), unit = common(self.logspace)
