@@ -16,6 +16,7 @@ from tieline.cosim.interfaces import FEDERATES, GRID, NETWORK
 from tieline.cosim.ports import reserved_port
 from tieline.cosim.runfile import federation_of
 from tieline.errors import CosimError, TielineError
+from tieline.experiment.folder import write_json
 from tieline.experiment.guests import GuestProcess, guest_processes
 from tieline.experiment.interrupts import current_interrupts, interruptible
 from tieline.experiment.remote import Remote
@@ -289,6 +290,4 @@ class Processes:
 
 def _write_port(run_file: Path, run: dict[str, Any], port: int) -> None:
     run["federation"] = {**run["federation"], "broker_port": port}
-    part = run_file.with_suffix(".part")
-    part.write_text(json.dumps(run, indent=2) + "\n", encoding="utf-8")
-    part.replace(run_file)
+    write_json(run_file, run)

@@ -125,11 +125,13 @@ def _save_incomplete(
     work: Path, base: Mapping[str, Any], outcome: Outcome | None, error: BaseException
 ) -> None:
     """Make readable what was written, and say in the manifest why it is not whole."""
-    (work / _RESERVE).unlink(missing_ok=True)
+    reserve = work / _RESERVE
     try:
-        # The manifest first: tables could take the room that it needs.
-        save_manifest(work, ended(base, {}, reason_of(error)))
+        if reserve.is_file():
+            # The manifest keeps its part: tables could take all the room there is.
+            os.truncate(reserve, _RESERVE_BYTES // 2)
         salvage(work)
+        reserve.unlink(missing_ok=True)
         save_manifest(work, ended(base, run_facts(outcome, work), reason_of(error)))
     except (OSError, TielineError) as second:
         error.add_note(f"what was written could not all be made readable: {second}")

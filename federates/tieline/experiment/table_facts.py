@@ -22,7 +22,7 @@ _GROWING = {
 def table_facts(folder: Path) -> dict[str, Any]:
     """Return `tables` (the hash of each), `tables_until_s` and `last_valid_s`, the least of those.
 
-    The last valid instant is None when no table that grows has a row.
+    The last valid instant is None where nothing was recorded of the grid.
     """
     paths = readable_tables(folder)
     until_s = {}
@@ -34,7 +34,7 @@ def table_facts(folder: Path) -> dict[str, Any]:
     return {
         "tables": {path.name: table_hash(path) for path in paths},
         "tables_until_s": until_s,
-        "last_valid_s": min(until_s.values(), default=None),
+        "last_valid_s": min(until_s.values()) if "grid" in until_s else None,
     }
 
 
