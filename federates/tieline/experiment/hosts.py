@@ -12,12 +12,12 @@ from tieline.cosim.runfile import federation_of
 from tieline.errors import CosimError, InputError
 from tieline.experiment.desk import Message, Wire, connect, hello, listen, refusal
 from tieline.experiment.export import check_empty, lay_out
+from tieline.experiment.interrupts import interruptible
 from tieline.experiment.launch import (
     BROKER,
     COMMANDS,
     Outcome,
     Processes,
-    termination_as_interrupt,
 )
 from tieline.experiment.plan import PlannedRun
 from tieline.experiment.remote import Remote, Uplink
@@ -77,7 +77,7 @@ def serve(
         FederateFailedError: a federate or the broker died, failed or hung.
     """
     settings = _settings(planned)
-    with termination_as_interrupt(), ExitStack() as stack:
+    with interruptible(), ExitStack() as stack:
         wires = _admit(planned, host, port, wait_s, say)
         for wire in wires.values():
             stack.callback(wire.close)
@@ -125,7 +125,7 @@ def join(
     """
     settings = _settings(planned)
     check_empty(folder)
-    with termination_as_interrupt(), closing(connect(*broker, wait_s)) as wire:
+    with interruptible(), closing(connect(*broker, wait_s)) as wire:
         port = _knock(wire, planned, federate, wait_s, say)
         place = {"broker_host": wire.other_address, "interface": wire.own_address}
         lay_out(planned, folder, broker_port=port, **place)

@@ -2,12 +2,10 @@
 
 import json
 import selectors
-import signal
 import sys
-import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -18,8 +16,11 @@ from tieline.cosim.interfaces import FEDERATES, GRID, NETWORK
 from tieline.cosim.ports import reserved_port
 from tieline.cosim.runfile import federation_of
 from tieline.errors import CosimError, TielineError
+from tieline.experiment.folder import write_json
 from tieline.experiment.guests import GuestProcess, guest_processes
+from tieline.experiment.interrupts import current_interrupts, interruptible
 from tieline.experiment.remote import Remote
+from tieline.experiment.strays import end_strays
 from tieline.experiment.supervise import Child, ProcessUse, Start, end_all, executed
 from tieline.experiment.watch import Progress, Suspect, Watch
 
@@ -37,7 +38,7 @@ COMMANDS: Mapping[str, Sequence[str]] = {
 _POLL_S = 0.1
 _SETTLE_S = 0.6
 _LINGER_S = 2.0
-_END_WITHIN_S = 9.2
+_END_WITHIN_S = 8.2
 _LEAST_GRACE_S = 1.0
 _MOST_GRACE_S = 5.0
 
@@ -104,7 +105,7 @@ def launch(
     settings, _ = federation_of(run)
     table = {**COMMANDS, **(commands or {})}
     with ExitStack() as stack:
-        stack.enter_context(termination_as_interrupt())
+        stack.enter_context(interruptible())
         if settings.core in ("inproc", "local"):
             starts = [(TOGETHER, [*table[TOGETHER], str(run_file)])]
         else:
@@ -148,9 +149,11 @@ class Processes:
         self._on_progress = on_progress
         self._watch = watch
         self._guests = list(guests)
+        self._has_guests = bool(guests)
         self._on_fault = on_fault
         self._on_word = on_word
         self._start_process = start
+        self._interrupts = current_interrupts()
         self._children: dict[str, Child | Remote] = {remote.name: remote for remote in remotes}
         self._marks: dict[str, float] = {}
 
@@ -161,10 +164,13 @@ class Processes:
             self._start(starts, stagger_s)
             self._follow()
         except BaseException as error:
-            if isinstance(error, KeyboardInterrupt) and self._on_fault is not None:
-                self._on_fault(Suspect(starts[0][0], "interrupted", CosimError.exit_code))
-            self._end()
-            self._salvage(error)
+            with self._interrupts.hold():
+                if isinstance(error, KeyboardInterrupt) and self._on_fault is not None:
+                    self._on_fault(Suspect(starts[0][0], "interrupted", CosimError.exit_code))
+                self._end()
+                self._salvage(error)
+                if isinstance(error, KeyboardInterrupt):
+                    error.outcome = self._outcome()  # type: ignore[attr-defined]
             raise
         return self._outcome()
 
@@ -179,7 +185,7 @@ class Processes:
     ) -> None:
         log = self._folder / "logs" / f"{name}.log"
         try:
-            self._children[name] = Child(name, command, log, start, has_word)
+            self._children[name] = Child(name, command, log, start, has_word, self._folder)
         except OSError as error:
             self._fail(Suspect(name, f"could not be started: {error}", CosimError.exit_code))
 
@@ -252,7 +258,11 @@ class Processes:
     def _end(self) -> None:
         children = tuple(self._children.values())
         left_s = _END_WITHIN_S - self._watch.silence_s
-        end_all(children, min(_MOST_GRACE_S, max(_LEAST_GRACE_S, left_s)))
+        grace_s = min(_MOST_GRACE_S, max(_LEAST_GRACE_S, left_s))
+        end_all(children, grace_s, lambda: self._interrupts.is_hurried)
+        if self._has_guests:
+            # A guest's own children may have left its group.
+            end_strays(str(self._folder.resolve()))
         self._hear()
         for child in children:
             child.close()
@@ -280,26 +290,4 @@ class Processes:
 
 def _write_port(run_file: Path, run: dict[str, Any], port: int) -> None:
     run["federation"] = {**run["federation"], "broker_port": port}
-    part = run_file.with_suffix(".part")
-    part.write_text(json.dumps(run, indent=2) + "\n", encoding="utf-8")
-    part.replace(run_file)
-
-
-@contextmanager
-def termination_as_interrupt() -> Iterator[None]:
-    """Have SIGTERM end a run as Ctrl-C does; left alone outside the main thread or if handled."""
-    if (
-        threading.current_thread() is not threading.main_thread()
-        or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL
-    ):
-        yield
-        return
-
-    def interrupt(*_: object) -> NoReturn:
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    write_json(run_file, run)

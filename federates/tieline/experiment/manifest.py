@@ -9,23 +9,16 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import tieline
+from tieline.experiment.folder import FORMAT, MANIFEST, write_json
 from tieline.experiment.launch import Outcome
 from tieline.experiment.plan import Plan, PlannedRun
-from tieline.experiment.results import FORMAT, MANIFEST, table_hash
 from tieline.experiment.sweep import Point
+from tieline.experiment.table_facts import table_facts
 from tieline.problems import Path, value_at
 
 STREAMS = "one numpy PCG64 generator a random thing, from the seed and its name (tieline.streams)"
 
 _PACKAGES = ("helics", "numpy", "scipy", "numba", "pandas", "pyarrow", "pydantic", "networkx")
-
-
-def write_json(path: pathlib.Path, data: object) -> None:
-    """Write a JSON file that appears whole or not at all."""
-    text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
-    part = path.with_name(f".{path.name}.part")
-    part.write_text(text + "\n", encoding="utf-8")
-    part.replace(path)
 
 
 def versions() -> dict[str, str]:
@@ -131,10 +124,10 @@ def save_manifest(folder: pathlib.Path, manifest: Mapping[str, Any]) -> None:
 
 
 def run_facts(outcome: Outcome | None, folder: pathlib.Path) -> dict[str, Any]:
-    """Return what a launch found out (if it got so far) and the content hash of every table."""
-    hashes = {path.name: table_hash(path) for path in sorted(folder.glob("*.parquet"))}
+    """Return what a launch found out (if it got so far), and `table_facts`."""
+    facts = table_facts(folder)
     if outcome is None:
-        return {"tables": hashes}
+        return facts
     return {
         "granted_ns": outcome.granted_ns,
         "times": {
@@ -143,5 +136,5 @@ def run_facts(outcome: Outcome | None, folder: pathlib.Path) -> dict[str, Any]:
             "cpu_s": {use.name: use.cpu_s for use in outcome.processes},
         },
         "peak_memory_bytes": {use.name: use.peak_bytes for use in outcome.processes},
-        "tables": hashes,
+        **facts,
     }

@@ -14,10 +14,14 @@ from typing import IO, Any, Protocol
 
 import tieline
 from tieline.cosim.process import LAUNCHER_VARIABLE
+from tieline.experiment.strays import RUN_VARIABLE
+from tieline.experiment.watch import Effort
 
 _LOG_LIMIT_BYTES = 1_000_000
 _TAIL_LINES = 8
 _READ_BYTES = 65_536
+_UTIME = 11
+"""Place of the processor time among the fields after a process's name in /proc/PID/stat."""
 _LONGEST_LINE_BYTES = 1_000_000
 
 
@@ -80,7 +84,8 @@ class Log:
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._file = path.open("wb")
+        # Unbuffered, so that nothing is left to fail when it is closed.
+        self._file = path.open("wb", buffering=0)
         self._left_bytes = _LOG_LIMIT_BYTES
         self.tail: collections.deque[str] = collections.deque(maxlen=_TAIL_LINES)
 
@@ -90,10 +95,14 @@ class Log:
         if self._left_bytes <= 0:
             return
         self._left_bytes -= len(line) + 1
-        self._file.write(line + b"\n")
+        text = line + b"\n"
         if self._left_bytes <= 0:
-            self._file.write(f"(the log ends at {_LOG_LIMIT_BYTES} bytes)\n".encode())
-        self._file.flush()
+            text += f"(the log ends at {_LOG_LIMIT_BYTES} bytes)\n".encode()
+        try:
+            self._file.write(text)
+        except OSError:
+            # A full disk must not keep the launcher from ending the run; the tail is in memory.
+            self._left_bytes = 0
 
     def close(self) -> None:
         """Close the file."""
@@ -109,6 +118,7 @@ class Child:
         log: where its standard error, and whatever else it says, is kept.
         start: how the process comes to be.
         has_word: whether its standard output is a federate's, with words about itself.
+        run: the run's folder, which marks the process and whatever it starts in turn.
 
     Attributes:
         exit_code: None while it runs; negative for the signal that killed it.
@@ -122,6 +132,7 @@ class Child:
         log: Path,
         start: Start = executed,
         has_word: bool = True,
+        run: Path | None = None,
     ) -> None:
         self.name = name
         self.exit_code: int | None = None
@@ -131,7 +142,7 @@ class Child:
         self._has_word = has_word
         self.log = Log(log)
         try:
-            self._process = start(command, child_environment())
+            self._process = start(command, child_environment(run))
         except BaseException:
             self.log.close()
             raise
@@ -187,6 +198,10 @@ class Child:
             return False
         return stat.rpartition(")")[2].split()[0] in ("T", "t")
 
+    def effort(self) -> Effort | None:
+        """Return what it has done so far; None where the kernel does not tell."""
+        return None if self.exit_code is not None else effort_of(self.pid)
+
     def terminate(self) -> None:
         """Ask the process to save and end; one that is stopped is woken for it."""
         if not self.poll():
@@ -231,13 +246,25 @@ class Child:
             yield from lines
 
 
-def end_all(children: Sequence[Process], grace_s: float) -> None:
-    """End every child: each may save for `grace_s` after SIGTERM, then its group is killed."""
+def end_all(
+    children: Sequence[Process],
+    grace_s: float,
+    is_hurried: Callable[[], bool] = lambda: False,
+) -> None:
+    """End every child: each may save for `grace_s` after SIGTERM, then its group is killed.
+
+    Args:
+        children: processes, ended or not.
+        grace_s: wall time, s.
+        is_hurried: whether they are to be killed at once.
+    """
     limit = time.monotonic() + grace_s
     try:
         for child in children:
             child.terminate()
         while time.monotonic() < limit and any(not child.poll() for child in children):
+            if is_hurried():
+                break
             time.sleep(0.02)
             drain(children)
     finally:
@@ -270,10 +297,26 @@ def shared_environment(before: Mapping[str, str]) -> dict[str, str]:
     return shared
 
 
-def child_environment() -> dict[str, str]:
-    """Return the environment of a process that must not outlive this one."""
+def child_environment(run: Path | None = None) -> dict[str, str]:
+    """Return the environment of a process that must not outlive this one, nor a run's folder."""
     own = {LAUNCHER_VARIABLE: str(os.getpid())}
+    if run is not None:
+        own[RUN_VARIABLE] = str(run.resolve())
     return dict(os.environ) | shared_environment(os.environ) | own
+
+
+def effort_of(pid: int) -> Effort | None:
+    """Return what a living process has done so far; None where the kernel does not tell."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+        io = Path(f"/proc/{pid}/io").read_text(encoding="ascii")
+    except OSError:
+        return None
+    fields = stat.rpartition(")")[2].split()
+    ticks = int(fields[_UTIME]) + int(fields[_UTIME + 1])
+    moved = dict(line.split(": ") for line in io.splitlines())
+    disk_bytes = int(moved["read_bytes"]) + int(moved["write_bytes"])
+    return Effort(ticks / os.sysconf("SC_CLK_TCK"), disk_bytes)
 
 
 def _peak_bytes(pid: int) -> int:
