@@ -20,6 +20,7 @@ from tieline.cosim.runfile import federation_of
 from tieline.errors import CosimError, TielineError
 from tieline.experiment.guests import GuestProcess, guest_processes
 from tieline.experiment.remote import Remote
+from tieline.experiment.run_logs import RunLogs
 from tieline.experiment.supervise import Child, ProcessUse, Start, end_all, executed
 from tieline.experiment.watch import Progress, Suspect, Watch
 
@@ -130,6 +131,7 @@ class Processes:
         on_fault: told who is at fault, or that the user is, before everything is ended.
         on_word: given every word as it came.
         start: how a federate or the broker comes to be.
+        name: of this launcher's own log.
     """
 
     def __init__(
@@ -143,8 +145,10 @@ class Processes:
         on_fault: Callable[[Suspect], None] | None = None,
         on_word: Callable[[Mapping[str, Any]], None] | None = None,
         start: Start = executed,
+        name: str = "launcher",
     ) -> None:
         self._folder = folder
+        self._logs = RunLogs(folder, watch, name)
         self._on_progress = on_progress
         self._watch = watch
         self._guests = list(guests)
@@ -160,12 +164,16 @@ class Processes:
         try:
             self._start(starts, stagger_s)
             self._follow()
+            self._logs.ended()
         except BaseException as error:
+            self._logs.failed(error)
             if isinstance(error, KeyboardInterrupt) and self._on_fault is not None:
                 self._on_fault(Suspect(starts[0][0], "interrupted", CosimError.exit_code))
             self._end()
             self._salvage(error)
             raise
+        finally:
+            self._logs.close()
         return self._outcome()
 
     def _start(self, starts: Sequence[tuple[str, list[str]]], stagger_s: float) -> None:
@@ -177,11 +185,12 @@ class Processes:
     def _start_one(
         self, name: str, command: Sequence[str], start: Start, *, has_word: bool
     ) -> None:
-        log = self._folder / "logs" / f"{name}.log"
         try:
-            self._children[name] = Child(name, command, log, start, has_word)
+            child = Child(name, command, self._logs.of(name), start, has_word)
         except OSError as error:
             self._fail(Suspect(name, f"could not be started: {error}", CosimError.exit_code))
+        self._children[name] = child
+        self._logs.started(child, command)
 
     def _start_guests(self) -> None:
         """Start the guests once the federates are opened, so that none waits for a compiler."""
@@ -222,6 +231,7 @@ class Processes:
     def _hear(self) -> None:
         for child in self._children.values():
             for message in child.read():
+                self._logs.hear(message)
                 if self._on_word is not None:
                     self._on_word(message)
                 progress = self._watch.hear(message)
@@ -242,6 +252,7 @@ class Processes:
         self._fail(suspect)
 
     def _fail(self, suspect: Suspect) -> NoReturn:
+        self._logs.fault(suspect)
         if self._on_fault is not None:
             self._on_fault(suspect)
         self._end()
@@ -256,6 +267,7 @@ class Processes:
         self._hear()
         for child in children:
             child.close()
+            self._logs.used(child.use)
 
     def _outcome(self) -> Outcome:
         uses = (child.use for child in self._children.values())
