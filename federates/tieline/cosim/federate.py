@@ -3,7 +3,6 @@
 import os
 import sys
 import threading
-import traceback
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from tieline.cosim.desks import desk_of
 from tieline.cosim.exchange import SIDES, Exchange
 from tieline.cosim.guard import GuardedParticipant
 from tieline.cosim.interfaces import Clock, OpenParticipant
+from tieline.cosim.journal import keep_journal, log_failure
 from tieline.cosim.link import FederationEndedError, HelicsLink
 from tieline.cosim.process import (
     die_with_launcher,
@@ -115,7 +115,7 @@ class Federate:
         self._status.enter("finished")
 
     def _fail(self, error: Exception) -> int:
-        traceback.print_exception(error)
+        log_failure(self.name, error)
         reason, fault = self._stop or _verdict(error)
         code = CosimError.exit_code if self._stop else exit_code_of(error)
         self._status.fail(reason, fault, code)
@@ -141,6 +141,7 @@ def main(name: str, open_participant: OpenParticipant) -> None:
     die_with_launcher()
     run, folder = read_run(sys.argv)
     status = Status(name, _STDOUT)
+    keep_journal(name, [status], _STDOUT)
     federate = Federate(name, run, folder, status, read_config(sys.argv))
     on_termination(lambda signal_name: _terminate(federate, signal_name))
     with Heartbeat([status]):

@@ -137,6 +137,7 @@ def join(
             remotes=[uplink],
             on_fault=uplink.end,
             on_word=uplink.hear,
+            name=f"launcher_of_{federate}",
         )
         outcome = processes.run([(federate, [*commands[federate], str(folder / "run.json")])])
         _leave(wire)

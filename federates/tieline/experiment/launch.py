@@ -20,6 +20,7 @@ from tieline.experiment.folder import write_json
 from tieline.experiment.guests import GuestProcess, guest_processes
 from tieline.experiment.interrupts import current_interrupts, interruptible
 from tieline.experiment.remote import Remote
+from tieline.experiment.run_logs import RunLogs
 from tieline.experiment.strays import end_strays
 from tieline.experiment.supervise import Child, ProcessUse, Start, end_all, executed
 from tieline.experiment.watch import Progress, Suspect, Watch
@@ -131,6 +132,7 @@ class Processes:
         on_fault: told who is at fault, or that the user is, before everything is ended.
         on_word: given every word as it came.
         start: how a federate or the broker comes to be.
+        name: of this launcher's own log.
     """
 
     def __init__(
@@ -144,8 +146,10 @@ class Processes:
         on_fault: Callable[[Suspect], None] | None = None,
         on_word: Callable[[Mapping[str, Any]], None] | None = None,
         start: Start = executed,
+        name: str = "launcher",
     ) -> None:
         self._folder = folder
+        self._logs = RunLogs(folder, watch, name)
         self._on_progress = on_progress
         self._watch = watch
         self._guests = list(guests)
@@ -163,8 +167,10 @@ class Processes:
         try:
             self._start(starts, stagger_s)
             self._follow()
+            self._logs.ended()
         except BaseException as error:
             with self._interrupts.hold():
+                self._logs.failed(error)
                 if isinstance(error, KeyboardInterrupt) and self._on_fault is not None:
                     self._on_fault(Suspect(starts[0][0], "interrupted", CosimError.exit_code))
                 self._end()
@@ -172,6 +178,8 @@ class Processes:
                 if isinstance(error, KeyboardInterrupt):
                     error.outcome = self._outcome()  # type: ignore[attr-defined]
             raise
+        finally:
+            self._logs.close()
         return self._outcome()
 
     def _start(self, starts: Sequence[tuple[str, list[str]]], stagger_s: float) -> None:
@@ -183,11 +191,13 @@ class Processes:
     def _start_one(
         self, name: str, command: Sequence[str], start: Start, *, has_word: bool
     ) -> None:
-        log = self._folder / "logs" / f"{name}.log"
         try:
-            self._children[name] = Child(name, command, log, start, has_word, self._folder)
+            log = self._logs.of(name)
+            child = Child(name, command, log, start, has_word, self._folder)
         except OSError as error:
             self._fail(Suspect(name, f"could not be started: {error}", CosimError.exit_code))
+        self._children[name] = child
+        self._logs.started(child, command)
 
     def _start_guests(self) -> None:
         """Start the guests once the federates are opened, so that none waits for a compiler."""
@@ -228,6 +238,7 @@ class Processes:
     def _hear(self) -> None:
         for child in self._children.values():
             for message in child.read():
+                self._logs.hear(message)
                 if self._on_word is not None:
                     self._on_word(message)
                 progress = self._watch.hear(message)
@@ -248,6 +259,7 @@ class Processes:
         self._fail(suspect)
 
     def _fail(self, suspect: Suspect) -> NoReturn:
+        self._logs.fault(suspect)
         if self._on_fault is not None:
             self._on_fault(suspect)
         self._end()
@@ -266,6 +278,7 @@ class Processes:
         self._hear()
         for child in children:
             child.close()
+            self._logs.used(child.use)
 
     def _outcome(self) -> Outcome:
         uses = (child.use for child in self._children.values())

@@ -1,6 +1,5 @@
 """One child process of a run: in a group of its own, heard, logged, ended and accounted for."""
 
-import collections
 import json
 import os
 import signal
@@ -16,9 +15,8 @@ import tieline
 from tieline.cosim.process import LAUNCHER_VARIABLE
 from tieline.experiment.strays import RUN_VARIABLE
 from tieline.experiment.watch import Effort
+from tieline.logs import LINE_BEGINS, Log, Record
 
-_LOG_LIMIT_BYTES = 1_000_000
-_TAIL_LINES = 8
 _READ_BYTES = 65_536
 _UTIME = 11
 """Place of the processor time among the fields after a process's name in /proc/PID/stat."""
@@ -79,43 +77,13 @@ def executed(
     )
 
 
-class Log:
-    """A text file that stops growing at 1 MB, and its last lines, which are kept in any case."""
-
-    def __init__(self, path: Path) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # Unbuffered, so that nothing is left to fail when it is closed.
-        self._file = path.open("wb", buffering=0)
-        self._left_bytes = _LOG_LIMIT_BYTES
-        self.tail: collections.deque[str] = collections.deque(maxlen=_TAIL_LINES)
-
-    def write(self, line: bytes) -> None:
-        """Add one line, given without its end."""
-        self.tail.append(line.decode(errors="replace"))
-        if self._left_bytes <= 0:
-            return
-        self._left_bytes -= len(line) + 1
-        text = line + b"\n"
-        if self._left_bytes <= 0:
-            text += f"(the log ends at {_LOG_LIMIT_BYTES} bytes)\n".encode()
-        try:
-            self._file.write(text)
-        except OSError:
-            # A full disk must not keep the launcher from ending the run; the tail is in memory.
-            self._left_bytes = 0
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
-
 class Child:
     """A process in its own session, whose standard output carries JSON lines.
 
     Args:
         name: what the run calls it.
         command: the program and its arguments.
-        log: where its standard error, and whatever else it says, is kept.
+        log: where what it logs and prints is kept.
         start: how the process comes to be.
         has_word: whether its standard output is a federate's, with words about itself.
         run: the run's folder, which marks the process and whatever it starts in turn.
@@ -129,7 +97,7 @@ class Child:
         self,
         name: str,
         command: Sequence[str],
-        log: Path,
+        log: Log,
         start: Start = executed,
         has_word: bool = True,
         run: Path | None = None,
@@ -140,7 +108,7 @@ class Child:
         self.use: ProcessUse | None = None
         self._peak_bytes = 0
         self._has_word = has_word
-        self.log = Log(log)
+        self.log = log
         try:
             self._process = start(command, child_environment(run))
         except BaseException:
@@ -164,15 +132,18 @@ class Child:
         return tuple(self._pending)
 
     def read(self) -> Iterator[dict[str, Any]]:
-        """Yield the JSON lines that have come; everything else goes to the log."""
+        """Yield the words of federates that have come; those and all else go to the log."""
         for descriptor in tuple(self._pending):
             for line in self._lines(descriptor):
-                is_word = self._has_word and descriptor == self._stdout
-                message = _parsed(line) if is_word else None
-                if message is None:
-                    self.log.write(line)
+                is_stdout = descriptor == self._stdout
+                said = _parsed(line) if self._has_word and is_stdout else None
+                if isinstance(said, Record):
+                    self.log.add(said)
+                elif said is not None:
+                    self.log.hear(said)
+                    yield said
                 else:
-                    yield message
+                    self.log.take(line, is_error=not is_stdout)
 
     def poll(self) -> bool:
         """Return whether the process has ended; what is left of its group ends with it."""
@@ -217,8 +188,7 @@ class Child:
 
     def close(self) -> None:
         """Close pipes and log; the process has ended."""
-        for message in self.read():
-            self.log.write(json.dumps(message).encode())
+        drain([self])
         for stream in (self._process.stdout, self._process.stderr):
             if stream is not None:
                 stream.close()
@@ -341,11 +311,14 @@ def _read(descriptor: int) -> bytes | None:
         return None
 
 
-def _parsed(line: bytes) -> dict[str, Any] | None:
-    if not line.startswith(b'{"federate"'):
-        return None
+def _parsed(line: bytes) -> dict[str, Any] | Record | None:
+    """Return a federate's word or record, None for what is neither."""
     try:
-        message: dict[str, Any] = json.loads(line)
+        if line.startswith(LINE_BEGINS):
+            return Record.from_line(line)
+        if line.startswith(b'{"federate"'):
+            word: dict[str, Any] = json.loads(line)
+            return word
     except ValueError:
         return None
-    return message
+    return None
