@@ -46,7 +46,7 @@ def gather(folders: Sequence[Path], target: Path) -> Path:
         _copy(folder, target)
     salvage(target)
     reason = _reason(words)
-    facts = run_facts(_outcome(words), target)
+    facts = run_facts(_outcome(words), target, manifest["seed"])
     result = {**manifest, **facts, "status": "incomplete", "reason": reason}
     if reason is None:
         result["status"] = "complete"

@@ -86,11 +86,11 @@ def run_in(work: Path, task: Task, launch: Launch, on_time: OnTime | None = None
     outcome = None
     try:
         outcome = launch(work, report)
-        facts = run_facts(outcome, work)
+        facts = run_facts(outcome, work, base["seed"])
         write_json(work / SUMMARY, summarise(Run(work, ended(base, facts, None))))
     except BaseException as error:
         salvage(work)
-        facts = run_facts(getattr(error, "outcome", outcome), work)
+        facts = run_facts(getattr(error, "outcome", outcome), work, base["seed"])
         save_manifest(work, ended(base, facts, reason_of(error)))
         raise
     save_manifest(work, ended(base, facts, None))
@@ -157,7 +157,8 @@ def mark_lost(work: Path, task: Task, reason: str) -> None:
         shutil.rmtree(work, ignore_errors=True)
         return
     salvage(work)
-    save_manifest(work, ended(task.manifest, run_facts(None, work), reason))
+    facts = run_facts(None, work, task.manifest["seed"])
+    save_manifest(work, ended(task.manifest, facts, reason))
     put(work, Path(task.folder))
 
 
