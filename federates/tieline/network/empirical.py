@@ -145,6 +145,11 @@ class EmpiricalDelay:
             for name, taken in zip(self._names, self._taken, strict=True)
         ]
 
+    def streams_of(self, flow: int) -> list[str]:
+        """Return the stream of a path's delays and, where packets are lost, that of its losses."""
+        kinds = ["delay", "loss"] if self._loss > 0 else ["delay"]
+        return [f"{kind} of {self._names[flow]}" for kind in kinds]
+
     def close(self) -> None:
         """Do nothing: there is nothing to let go of."""
 

@@ -83,6 +83,7 @@ class Fate:
         ended_ns: when the controller could use it, or when it was dropped.
         processing_ns: the controller's share of that.
         controller_jitter: the draw that lengthened it, if any.
+        draws: what an engine without links drew for it.
         remark: what else there is to say.
     """
 
@@ -98,4 +99,5 @@ class Fate:
     ended_ns: int | None = None
     processing_ns: int = 0
     controller_jitter: Draw | None = None
+    draws: list[Draw] = field(default_factory=list)
     remark: str | None = None

@@ -28,32 +28,21 @@ from tieline.network.packet.memory import (
     DATAGRAM,
     END_FLOW,
     END_FLOWS,
-    END_FORKS,
     END_HOW,
-    END_MEMBERS,
     END_SEQUENCE,
     END_TIME,
     ENDED,
     FIRST_FLOW,
-    FIRST_FORK,
-    FIRST_HOP,
-    FIRST_MEMBER,
-    FLOW,
     HAS_TAP,
     HEAP_SIZE,
-    HOP,
     HOP_PORT,
-    IP_BYTES,
     ITEM,
     LOST,
-    NO_PORT,
     NONE,
     PROCESSING_STREAM,
     RATE,
-    SEQUENCE,
     SPECIAL,
     TAP_FLOW,
-    TAP_HOP,
     TAP_PORT,
     TAP_SEQUENCE,
     TAP_TIME,
@@ -65,6 +54,7 @@ from tieline.network.packet.memory import (
 )
 from tieline.network.packet.packets import IP_HEADER, enter_datagram
 from tieline.network.packet.routes import Routes
+from tieline.network.packet.sight import Sight
 from tieline.network.spec import NetworkSpec, serialisation_ns
 
 
@@ -110,12 +100,12 @@ class TracingEngine(PacketEngine):
         self._code = KINDS * (sequence * len(spec.sources) + ends.source) + FRAME
         routes = Routes(spec)
         self._tree = routes.sources[ends.source][2]
-        self._carrier = flow if self._tree == NONE else self._tree
+        carrier = flow if self._tree == NONE else self._tree
+        self._sight = Sight(self._memory, flow, carrier, sequence)
         self._connection = int(self._memory.table("flows")[flow, CONNECTION])
-        self._segment = sequence
         if self._connection != NONE:
             row = self._memory.table("connections")[self._connection]
-            self._carrier, self._segment = int(row[tcp.DATA_FLOW]), NONE
+            self._sight.carrier, self._sight.segment = int(row[tcp.DATA_FLOW]), NONE
 
     @property
     def is_over(self) -> bool:
@@ -198,15 +188,15 @@ class TracingEngine(PacketEngine):
         memory = self._memory
         if self._connection != NONE:
             before = int(memory.table("connections")[self._connection, tcp.AVAILABLE])
-            self._segment = before
+            self._sight.segment = before
             self._else(now)
             after = int(memory.table("connections")[self._connection, tcp.AVAILABLE])
             if after == before:
-                self._segment = NONE
+                self._sight.segment = NONE
                 self.fate.remark = "the connection's send buffer was full"
             return
         if self._tree != NONE:
-            self._offer(now, self._row(self._first_row()), None)
+            self._offer(now, self._sight.row(self._sight.first_row()), None)
             return
         _pop_first(memory.cells, memory.layout)
         source = memory.table("sources")[self._source]
@@ -214,7 +204,7 @@ class TracingEngine(PacketEngine):
             size = int(memory.table("flows")[flow, DATAGRAM])
             arguments = (now, flow, self._sequence, size)
             if flow == self._flow:
-                self._offer(now, self._row(self._first_row()), None, arguments)
+                self._offer(now, self._sight.row(self._sight.first_row()), None, arguments)
             else:
                 enter_datagram(*arguments, memory.cells, memory.layout)
 
@@ -222,35 +212,35 @@ class TracingEngine(PacketEngine):
         """The packet reaches the end of a link."""
         self._copies.remove(copy)
         is_lost = self._memory.table("packets")[copy.slot, LOST] != 0
-        self._offer(now, None if is_lost else self._row(copy.row + 1), copy.slot)
+        self._offer(now, None if is_lost else self._sight.row(copy.row + 1), copy.slot)
 
     def _else(self, now: int) -> None:
         """Process an event of another packet, of a port, or of the connection."""
         waiting = [copy for copy in self._copies if copy.waits]
         ports = {copy.row: self._port(copy.row, now) for copy in waiting}
-        first = self._first_row() if self._connection != NONE else NONE
+        first = self._sight.first_row() if self._connection != NONE else NONE
         before = self._port(first, now) if first != NONE else None
         known = {copy.slot for copy in self._copies}
         kernel.step(self._memory.cells, self._memory.layout)
         for copy in waiting:
-            if self._starts_ns(copy.row) is not None:
+            if self._sight.starts_ns(copy.row) is not None:
                 self._note_start(copy, ports[copy.row])
         if before is not None:
             self._take_new_segments(now, first, before, known)
 
     def _take_new_segments(self, now: int, row: int, port: Port, known: set[int]) -> None:
         """Take up transmissions of the segment that an event has begun."""
-        for slot in self._slots(row):
+        for slot in self._sight.slots(row):
             if slot not in known:
-                hop = hop_of(now, row, self._ip_bytes(slot), port, self._memory, self._spec)
+                hop = hop_of(now, row, self._sight.ip_bytes(slot), port, self._memory, self._spec)
                 self._ahead(hop, now, row)
                 self._follow(slot, row, hop, port)
 
     def _ahead(self, hop: Hop, now: int, row: int) -> None:
         """Count what the same event has put before a segment."""
         port = int(self._memory.table("hops")[row, HOP_PORT])
-        for tap in self._new_taps():
-            if tap[TAP_FLOW] == self._carrier and tap[TAP_SEQUENCE] == self._segment:
+        for tap in self._sight.new_taps():
+            if tap[TAP_FLOW] == self._sight.carrier and tap[TAP_SEQUENCE] == self._sight.segment:
                 return
             if tap[TAP_PORT] == port:
                 hop.waiting_packets += int(tap[TAP_TIME] > now)
@@ -276,9 +266,9 @@ class TracingEngine(PacketEngine):
         port = None if row is None else self._port(row, now)
         ip_bytes = 0
         if slot is not None:
-            ip_bytes = self._ip_bytes(slot)
+            ip_bytes = self._sight.ip_bytes(slot)
         elif row is not None:
-            ip_bytes = int(memory.table("flows")[self._carrier, DATAGRAM]) + IP_HEADER
+            ip_bytes = int(memory.table("flows")[self._sight.carrier, DATAGRAM]) + IP_HEADER
         hop = None
         if row is not None and port is not None:
             hop = hop_of(now, row, ip_bytes, port, memory, self._spec)
@@ -288,7 +278,7 @@ class TracingEngine(PacketEngine):
             enter_datagram(*entering, memory.cells, memory.layout)
         if row is None or port is None or hop is None:
             return
-        slots = self._slots(row)
+        slots = self._sight.slots(row)
         if slots:
             self._follow(slots[0], row, hop, port)
         else:
@@ -300,12 +290,12 @@ class TracingEngine(PacketEngine):
         self.fate.hops.append(hop)
         copy = _Copy(slot, row, hop, waits=True)
         self._copies.append(copy)
-        if self._starts_ns(row) is not None:
+        if self._sight.starts_ns(row) is not None:
             self._note_start(copy, port)
 
     def _note_start(self, copy: _Copy, port: Port) -> None:
         """A packet goes on its link, or knows when it will."""
-        starts_ns, reaches_ns = self._starts_ns(copy.row), self._reaches_ns(copy.slot)
+        starts_ns, reaches_ns = self._sight.starts_ns(copy.row), self._sight.reaches_ns(copy.slot)
         assert starts_ns is not None
         copy.waits = False
         is_lost = bool(self._memory.table("packets")[copy.slot, LOST])
@@ -325,7 +315,7 @@ class TracingEngine(PacketEngine):
 
     def _move(self, copy: _Copy) -> None:
         """Follow a packet whose link has got another rate before its transmission began."""
-        reaches_ns = self._reaches_ns(copy.slot)
+        reaches_ns = self._sight.reaches_ns(copy.slot)
         if reaches_ns == copy.hop.reaches_ns:
             return
         port = int(self._memory.table("hops")[copy.row, HOP_PORT])
@@ -372,49 +362,6 @@ class TracingEngine(PacketEngine):
     def _port(self, row: int, now: int) -> Port:
         number = int(self._memory.table("hops")[row, HOP_PORT])
         return port_now(number, now, self._memory, self._supplies)
-
-    def _first_row(self) -> int:
-        return int(self._memory.table("flows")[self._carrier, FIRST_HOP])
-
-    def _row(self, row: int) -> int | None:
-        """Return the row of `hops` that the packet takes at one: its link, or its branch's."""
-        plan = self._memory.table("hops")[row]
-        if plan[HOP_PORT] >= 0:
-            return row
-        if plan[HOP_PORT] == NO_PORT:
-            return None
-        hops, members = self._memory.table("hops"), self._memory.table("members")
-        for fork in range(int(plan[FIRST_FORK]), int(plan[END_FORKS])):
-            target = int(self._memory.table("forks")[fork, 0])
-            if target >= 0:
-                first, end = (int(hops[target, column]) for column in (FIRST_MEMBER, END_MEMBERS))
-                if self._flow in members[first:end, 0]:
-                    return target
-        return None
-
-    def _slots(self, row: int) -> list[int]:
-        """Return the slots of the packet on, or before, the link of a row of `hops`."""
-        inside = self._memory.inside()
-        own = self._memory.table("packets")[inside]
-        is_it = (own[:, FLOW] == self._carrier) & (own[:, SEQUENCE] == self._segment)
-        return [int(slot) for slot in inside[is_it & (own[:, HOP] == row)]]
-
-    def _ip_bytes(self, slot: int) -> int:
-        return int(self._memory.table("packets")[slot, IP_BYTES])
-
-    def _new_taps(self) -> Cells:
-        return self._memory.table("taps")[: self._memory.control[TAPPED]]
-
-    def _starts_ns(self, row: int) -> int | None:
-        """Return when the packet's first bit is on a link, if the last event decided that."""
-        taps = self._new_taps()
-        own = (taps[:, TAP_FLOW] == self._carrier) & (taps[:, TAP_SEQUENCE] == self._segment)
-        times = taps[own & (taps[:, TAP_HOP] == row), TAP_TIME]
-        return int(times[-1]) if len(times) else None
-
-    def _reaches_ns(self, slot: int) -> int:
-        events = self._memory.events()
-        return int(events[events[:, ITEM] == KINDS * slot + ARRIVAL, TIME][0])
 
 
 @compiled
