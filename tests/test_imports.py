@@ -154,3 +154,10 @@ def test_what_the_cache_of_compiled_code_leaves_out_takes_no_part_in_it() -> Non
             assert not begins(imports(path), "tieline.compiled", "numba"), path
     for path in [*part("grid"), *part("network"), *part("wams"), *part("c37118")]:
         assert not begins(imports(path), *outside), path
+
+
+def test_a_packet_is_looked_up_without_grid_and_federation() -> None:
+    """What is repeated is the network of a result; a whole run would be another run."""
+    for path in part("fates"):
+        forbidden = ("tieline.grid", "tieline.network.federate", "tieline.cosim.federate")
+        assert not begins(imports(path), *forbidden), path

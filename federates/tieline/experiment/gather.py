@@ -48,7 +48,7 @@ def gather(folders: Sequence[Path], target: Path) -> Path:
     salvage(target)
     merge(target)
     reason = _reason(words)
-    facts = run_facts(_outcome(words), target)
+    facts = run_facts(_outcome(words), target, manifest["seed"])
     result = {**manifest, **facts, "status": "incomplete", "reason": reason}
     if reason is None:
         result["status"] = "complete"

@@ -1,9 +1,10 @@
 """Reads an experiment whole: files, `--set` options and sweep; every finding in one message."""
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from tieline.errors import InputError
 from tieline.experiment.layers import (
@@ -15,7 +16,7 @@ from tieline.experiment.layers import (
 )
 from tieline.experiment.overrides import Sources, apply, parse_settings, path_of
 from tieline.experiment.schema import Experiment
-from tieline.experiment.sweep import Point, expand, judge
+from tieline.experiment.sweep import Point, expand, judge, sweep_streams
 from tieline.problems import checked
 
 __all__ = ["Study", "find_experiment", "load_experiment", "shipped_experiments"]
@@ -32,12 +33,14 @@ class Study:
         points: the runs, in order; at least one.
         is_sweep: whether it asks for a sweep, of however many points.
         base: the experiment without its sweep, as the files and options have it.
+        random_streams: seed and names of the streams that the sweep's points were drawn from.
     """
 
     sources: Sources
     points: tuple[Point, ...]
     is_sweep: bool
     base: Experiment
+    random_streams: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -92,7 +95,8 @@ def load_experiment(reference: str, settings: Sequence[str] = ()) -> Study:
     if findings:
         raise InputError(sorted(dict.fromkeys(findings), key=_line))
     assert experiment is not None
-    return Study(sources, tuple(points), bool(sweep), experiment)
+    drawn = sweep_streams(sweep, data) if isinstance(sweep, dict) else {}
+    return Study(sources, tuple(points), bool(sweep), experiment, drawn)
 
 
 def _line(finding: str) -> tuple[str, int]:

@@ -16,7 +16,11 @@ from tieline.experiment.sweep import Point
 from tieline.experiment.table_facts import table_facts
 from tieline.problems import Path, value_at
 
-STREAMS = "one numpy PCG64 generator a random thing, from the seed and its name (tieline.streams)"
+_GENERATOR = (
+    "one numpy PCG64 a random thing, from SeedSequence(seed, spawn_key): the key is the SHA-256 of "
+    "the stream's name as eight little-endian 32-bit words (tieline.streams)"
+)
+_STREAMS = "streams.json"
 
 _PACKAGES = ("helics", "numpy", "scipy", "numba", "pandas", "pyarrow", "pydantic", "networkx")
 
@@ -56,7 +60,7 @@ def run_manifest(
         "config_hash": planned.run["config_hash"],
         "inputs": dict(planned.inputs),
         "seed": experiment.seed,
-        "random_streams": STREAMS,
+        "random_streams": {"generator": _GENERATOR, "seed": experiment.seed},
         "clock": planned.run["clock"],
         "tripped_units": "simulated to the end behind their open branch, and in no average",
         "versions": versions(),
@@ -100,6 +104,7 @@ def sweep_manifest(plan: Plan, reason: str | None) -> dict[str, Any]:
         "name": first.name,
         "question": first.question,
         "points": points,
+        "random_streams": {"generator": _GENERATOR, **plan.study.random_streams},
         "config_hash": hashlib.sha256(hashes.encode()).hexdigest(),
         "config_file": str(sources.document.path.resolve()),
         "options": [f"{_key(given.path)}={json.dumps(given.value)}" for given in sources.options],
@@ -123,9 +128,21 @@ def save_manifest(folder: pathlib.Path, manifest: Mapping[str, Any]) -> None:
     write_json(folder / MANIFEST, manifest)
 
 
-def run_facts(outcome: Outcome | None, folder: pathlib.Path) -> dict[str, Any]:
-    """Return what a launch found out (if it got so far), and `table_facts`."""
-    facts = table_facts(folder)
+def random_streams(seed: int, folder: pathlib.Path) -> dict[str, Any]:
+    """Return how every random stream of a run comes about, and how much of each was used.
+
+    Only the network draws at random while a run goes on; it leaves the list in the folder.
+    """
+    streams = {"generator": _GENERATOR, "seed": seed}
+    path = folder / _STREAMS
+    if not path.is_file():
+        return streams
+    return streams | {"network": json.loads(path.read_text(encoding="utf-8"))}
+
+
+def run_facts(outcome: Outcome | None, folder: pathlib.Path, seed: int) -> dict[str, Any]:
+    """Return what a launch found out (if it got so far), `table_facts` and the random streams."""
+    facts = {**table_facts(folder), "random_streams": random_streams(seed, folder)}
     if outcome is None:
         return facts
     return {

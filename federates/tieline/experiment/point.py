@@ -92,7 +92,7 @@ def run_in(
     try:
         _begin(work, task, base)
         outcome = launch(work, report)
-        facts = run_facts(outcome, work)
+        facts = run_facts(outcome, work, base["seed"])
         write_json(work / SUMMARY, summarise(Run(work, ended(base, facts, None))))
         (work / _RESERVE).unlink()
         save_manifest(work, ended(base, facts, None))
@@ -132,7 +132,8 @@ def _save_incomplete(
             os.truncate(reserve, _RESERVE_BYTES // 2)
         salvage(work)
         reserve.unlink(missing_ok=True)
-        save_manifest(work, ended(base, run_facts(outcome, work), reason_of(error)))
+        facts = run_facts(outcome, work, base["seed"])
+        save_manifest(work, ended(base, facts, reason_of(error)))
     except (OSError, TielineError) as second:
         error.add_note(f"what was written could not all be made readable: {second}")
 
@@ -203,7 +204,8 @@ def mark_lost(work: Path, task: Task, reason: str) -> None:
         return
     (work / _RESERVE).unlink(missing_ok=True)
     salvage(work)
-    save_manifest(work, ended(task.manifest, run_facts(None, work), reason))
+    facts = run_facts(None, work, task.manifest["seed"])
+    save_manifest(work, ended(task.manifest, facts, reason))
     put(work, Path(task.folder))
 
 

@@ -82,6 +82,10 @@ class SweepFile(BaseModel):
     sweep: SweepBlock
 
 
+SEEDS = "seeds of sweep points"
+"""The stream of the points' own seeds."""
+
+
 @dataclass(frozen=True)
 class Row:
     """One point to be: its names, and the settings that it has in place of the experiment's."""
@@ -114,9 +118,20 @@ def rows(block: SweepBlock, seed: int) -> list[Row]:
             labels = [f"{number}: {label}" for number, label in zip(numbers, labels, strict=True)]
         slugs = _slugs(labels, numbers)
     if block.own_seeds:
-        own = stream(seed, "seeds of sweep points").integers(0, 2**31, len(values))
+        own = stream(seed, SEEDS).integers(0, 2**31, len(values))
         settings = [{**row, "seed": int(own[i])} for i, row in enumerate(settings)]
     return [Row(*row) for row in zip(labels, slugs, settings, strict=True)]
+
+
+def streams_of(block: SweepBlock, seed: int) -> dict[str, Any]:
+    """Return the seed of a block's draws and the names of its random streams."""
+    names: list[str] = []
+    if block.method != "grid":
+        kind = "sweep" if block.method == "random" else "latin hypercube"
+        names = [f"{kind} over {key}" for key in block.over]
+    if block.own_seeds:
+        names.append(SEEDS)
+    return {"seed": seed if block.seed is None else block.seed, "names": names}
 
 
 def slug_of(label: str) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 from tieline.experiment.layers import REPLACED
 from tieline.experiment.overrides import Override, Sources, apply, path_of, related
-from tieline.experiment.sampling import SweepFile, rows, slug_of
+from tieline.experiment.sampling import SweepFile, rows, slug_of, streams_of
 from tieline.experiment.schema import FIXED, Experiment, contradictions, without_effect
 from tieline.problems import Path, checked, has_keys, near
 
@@ -42,6 +42,18 @@ def expand(sweep: object, data: Any, sources: Sources) -> tuple[list[Point], lis
         return _made(sweep, data, sources)
     where = sources.where([("sweep",)])
     return [], [f"{where}: sweep must be a list of points, or a group of keys (got {sweep!r})"]
+
+
+def sweep_streams(sweep: object, data: Any) -> dict[str, Any]:
+    """Return the seed and the names of the random streams that a sweep's points were drawn from."""
+    block, _ = checked(SweepFile, {"sweep": sweep})
+    return {} if block is None else streams_of(block.sweep, _seed(data))
+
+
+def _seed(data: Any) -> int:
+    """Return the experiment's seed, or the default where it states none that can be."""
+    seed = data.get("seed", 1) if isinstance(data, dict) else 1
+    return seed if isinstance(seed, int) and seed >= 0 else 1
 
 
 def judge(points: Sequence[Point], sources: Sources) -> Iterable[str]:
@@ -130,9 +142,8 @@ def _made(sweep: Mapping[Any, Any], data: Any, sources: Sources) -> tuple[list[P
     if misplaced:
         return [], misplaced
     places.setdefault("seed", sources.where([("sweep", "own_seeds")]))
-    seed = data.get("seed", 1) if isinstance(data, dict) else 1
     points, findings = [], Gathered()
-    for row in rows(block, seed if isinstance(seed, int) and seed >= 0 else 1):
+    for row in rows(block, _seed(data)):
         overrides = [Override(path_of(key), row.settings[key], places[key]) for key in row.settings]
         groups = _groups(overrides)
         for group in groups:

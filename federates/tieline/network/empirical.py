@@ -15,6 +15,7 @@ from tieline.network.engine import (
     Counts,
     LinkUse,
     Outcome,
+    StreamUse,
     check_not_late,
     in_order,
 )
@@ -49,7 +50,7 @@ class EmpiricalDelay:
     ) -> None:
         self.lookahead_ns = min((delay.least_ns for delay in delays), default=0)
         self._destinations = np.arange(len(spec.destinations), dtype=np.int64)
-        names = [
+        self._names = names = [
             f"{source.name}->{destination.name}"
             for source in spec.sources
             for destination in spec.destinations
@@ -60,6 +61,7 @@ class EmpiricalDelay:
         ]
         self._delays_ns = np.empty((len(names), CHUNK), dtype=np.int64)
         self._used = np.full(len(names), CHUNK)
+        self._taken = np.zeros(len(names), dtype=np.int64)
         self._loss = loss
         self._losses = [stream(seed, f"loss of {name}") for name in names]
         self._is_lost = np.zeros((len(names), CHUNK), dtype=bool)
@@ -132,6 +134,22 @@ class EmpiricalDelay:
         """Return nothing: there are no links."""
         return NO_LINKS
 
+    def streams(self) -> list[StreamUse]:
+        """Return the streams of delays and, where packets are lost, those of losses."""
+        kinds = [("delay", "delays, ns")]
+        if self._loss > 0:
+            kinds.append(("loss", f"lost if the number is below {self._loss:g}"))
+        return [
+            StreamUse(f"{kind} of {name}", gives, int(taken))
+            for kind, gives in kinds
+            for name, taken in zip(self._names, self._taken, strict=True)
+        ]
+
+    def streams_of(self, flow: int) -> list[str]:
+        """Return the stream of a path's delays and, where packets are lost, that of its losses."""
+        kinds = ["delay", "loss"] if self._loss > 0 else ["delay"]
+        return [f"{kind} of {self._names[flow]}" for kind in kinds]
+
     def close(self) -> None:
         """Do nothing: there is nothing to let go of."""
 
@@ -144,4 +162,5 @@ class EmpiricalDelay:
             self._used[flow] = 0
         places = self._used[flows]
         self._used[flows] += 1
+        self._taken[flows] += 1
         return self._delays_ns[flows, places], self._is_lost[flows, places]

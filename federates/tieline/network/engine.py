@@ -142,6 +142,23 @@ class LinkUse:
     dropped_down: int = 0
 
 
+@dataclass(frozen=True)
+class StreamUse:
+    """A random stream of an engine.
+
+    Attributes:
+        name: as `tieline.streams.stream` has it.
+        gives: in words, what its numbers are.
+        taken: how many of them have been used; None if nobody counts them.
+        is_seeded: whether the experiment's seed and the name decide its numbers.
+    """
+
+    name: str
+    gives: str
+    taken: int | None
+    is_seeded: bool = True
+
+
 class Engine(Protocol):
     """A network that carries one packet of every frame to every destination.
 
@@ -192,6 +209,9 @@ class Engine(Protocol):
 
         Reading them begins a new span for `max_queue`; nothing else changes.
         """
+
+    def streams(self) -> list[StreamUse]:
+        """Return every random stream, with the numbers used up to the last `run_until`."""
 
     def close(self) -> None:
         """Let go of what the engine holds outside Python; nothing is asked of it afterwards."""

@@ -14,9 +14,8 @@ from tieline.network.linkless import open_without_links
 from tieline.network.ns3 import Ns3Engine
 from tieline.network.packet import PacketEngine
 from tieline.network.recorder import Recorder
-from tieline.network.settings import PACKET_ENGINES, NetworkSettings
 from tieline.network.spec import FRAME_BYTES, NetworkSpec
-from tieline.network.topology import network_spec
+from tieline.network.stated import stated_network
 from tieline.units import seconds_to_ns
 
 
@@ -27,11 +26,8 @@ def open_participant(run: dict[str, Any], folder: Path) -> "NetworkParticipant":
         InputError: the topology is faulty, a setting that the engine needs is missing, or ns-3 is
             not installed or cannot carry the network.
     """
-    stated = run["network"]
-    settings = NetworkSettings.model_validate({**stated, "topology": stated["topology"] or "case"})
+    settings, spec = stated_network(run)
     sites = (run["sources"], run["destinations"])
-    topology = Path(settings.topology) if settings.engine in PACKET_ENGINES else None
-    spec = network_spec(settings, topology, *sites)
     engine: Engine
     if settings.engine == "packet":
         engine = PacketEngine(spec, run["seed"])

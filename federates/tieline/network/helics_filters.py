@@ -16,6 +16,7 @@ from tieline.network.engine import (
     Counts,
     LinkUse,
     Outcome,
+    StreamUse,
     check_not_late,
     in_order,
 )
@@ -65,6 +66,7 @@ class HelicsFilters:
         )
         self._destinations = len(spec.destinations)
         self._delay_ns = delay_ns
+        self._loss = loss
         self._frames: dict[int, _Frame] = {}
         self._now_ns = -1
         self._sent = self._delivered = self._dropped = 0
@@ -128,6 +130,12 @@ class HelicsFilters:
     def link_counters(self) -> NDArray[np.void]:
         """Return nothing: there are no links."""
         return NO_LINKS
+
+    def streams(self) -> list[StreamUse]:
+        """Return the one generator of HELICS's own, if it draws anything."""
+        if self._loss == 0:
+            return []
+        return [StreamUse("random_drop of HELICS", "losses", None, is_seeded=False)]
 
     def close(self) -> None:
         """End the federation of the filters; again does nothing."""

@@ -13,6 +13,7 @@ from tieline.network.engine import (
     Counts,
     LinkUse,
     Outcome,
+    StreamUse,
     check_not_late,
     in_order,
 )
@@ -84,6 +85,10 @@ class ConstantDelay:
     def link_counters(self) -> NDArray[np.void]:
         """Return nothing: there are no links."""
         return NO_LINKS
+
+    def streams(self) -> list[StreamUse]:
+        """Return nothing: nothing is random."""
+        return []
 
     def close(self) -> None:
         """Do nothing: there is nothing to let go of."""

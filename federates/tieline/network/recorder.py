@@ -11,6 +11,7 @@ from tieline.network.results import PacketLog, write_ages, write_delays, write_f
 from tieline.network.series import ControllerSeries, LinkSeries
 from tieline.network.spec import NetworkSpec, least_delay_ns
 from tieline.network.stats import FlowStatistics
+from tieline.network.streams_used import STREAMS, write_streams
 from tieline.units import NS_PER_S
 
 
@@ -55,6 +56,7 @@ class Recorder:
             self._links = LinkSeries(folder / "link_series.parquet", engine)
             path = folder / "controller_series.parquet"
             self._controllers = ControllerSeries(path, spec, flow_of)
+        write_streams(folder / STREAMS, engine.streams())
         # Compiles, where that is still to be done, before the federation waits for an answer.
         self.add(Outcome(NO_ARRIVALS, NO_DROPS), 0)
 
@@ -99,6 +101,7 @@ class Recorder:
         write_links(self._folder / "links.parquet", self._engine.links(), end_ns)
         write_delays(self._folder / "delays.parquet", self._flows)
         write_ages(self._folder / "ages.parquet", self._spec, self._flow_of, self._age, end_ns)
+        write_streams(self._folder / STREAMS, self._engine.streams())
         if self._log is not None:
             self._log.close()
         if self._window_ns is not None:

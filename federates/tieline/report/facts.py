@@ -142,11 +142,22 @@ def provenance(manifest: Mapping[str, Any], files: Iterable[str]) -> Html:
         ("versions", versions),
     ]
     if "random_streams" in manifest:
-        items.append(("randomness", f"seed {manifest['seed']}; {manifest['random_streams']}"))
+        items.append(("randomness", _randomness(manifest)))
     for name, digest in manifest.get("inputs", {}).items():
         items.append((f"hash of the {name}", element("code", digest)))
     listed = element("p", *_listed(files))
     return Html(pairs(items) + listed)
+
+
+def _randomness(manifest: Mapping[str, Any]) -> str:
+    streams = manifest["random_streams"]
+    if isinstance(streams, str):
+        return f"seed {manifest['seed']}; {streams}"
+    families = streams.get("network", [])
+    count = sum(len(family["taken"]) for family in families)
+    listed = f"; {count} streams of the network, named in manifest.json" if count else ""
+    seed = f"seed {streams['seed']}; " if "seed" in streams else ""
+    return f"{seed}{streams['generator']}{listed}"
 
 
 def figures(folder: Path) -> Html:

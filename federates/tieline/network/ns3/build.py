@@ -10,6 +10,7 @@ from tieline.network.ns3.addresses import addressed
 from tieline.network.ns3.library import model
 from tieline.network.ns3.limits import check_carried
 from tieline.network.packet.draws import gaps, sizes
+from tieline.network.packet.supplies import GAPS, LOSSES, SIZES
 from tieline.network.spec import FRAME_BYTES, Link, NetworkSpec, packet_bytes, service_ns
 from tieline.network.traffic.base import Sized
 from tieline.streams import stream
@@ -18,8 +19,10 @@ _NO_SUPPLY = -1
 _CROSS = -1
 
 
-def built(spec: NetworkSpec, seed: int) -> tuple[Any, dict[int, Chunks]]:
-    """Return the network, its cross traffic planned, and what fills each of its supplies.
+def built(spec: NetworkSpec, seed: int) -> tuple[Any, dict[int, Chunks], list[tuple[str, str]]]:
+    """Return the network, its cross traffic planned, what fills its supplies, and their streams.
+
+    Of each stream the last has its name and, in words, what its numbers are.
 
     Args:
         spec: the network.
@@ -41,13 +44,14 @@ def built(spec: NetworkSpec, seed: int) -> tuple[Any, dict[int, Chunks]]:
     builder.add_links(rates_bps)
     builder.add_pmu_flows()
     builder.add_cross_flows()
-    return builder.network, builder.filled
+    return builder.network, builder.filled, builder.streams
 
 
 class _Builder:
     def __init__(self, spec: NetworkSpec, seed: int) -> None:
         self.network = model().Network(len(spec.nodes), len(spec.flows))
         self.filled: dict[int, Chunks] = {}
+        self.streams: list[tuple[str, str]] = []
         self._spec = spec
         self._seed = seed
         self._numbers = {node.name: number for number, node in enumerate(spec.nodes)}
@@ -95,21 +99,23 @@ class _Builder:
                 number,
                 cross.dscp,
                 cross.traffic.payload_bytes,
-                self._supply(sizes(cross)),
-                self._supply(gaps(self._seed, cross)),
+                self._supply(sizes(cross), f"sizes of {cross.name}", SIZES),
+                self._supply(gaps(self._seed, cross), f"arrivals of {cross.name}", GAPS),
             )
 
     def _losses(self, loss: Loss | None, name: str) -> int:
         generator = stream(self._seed, f"loss of {name}")
-        return self._supply(None if loss is None else loss.gaps(generator))
+        chunks = None if loss is None else loss.gaps(generator)
+        return self._supply(chunks, f"loss of {name}", LOSSES)
 
-    def _supply(self, chunks: Chunks | None) -> int:
+    def _supply(self, chunks: Chunks | None, name: str, gives: str) -> int:
         if chunks is None:
             return _NO_SUPPLY
         number = int(self.network.AddSupply(CHUNK))
         for _ in range(2):
             self.network.Fill(number, next(chunks), CHUNK)
         self.filled[number] = chunks
+        self.streams.append((name, gives))
         return number
 
 

@@ -16,6 +16,7 @@ from tieline.network.engine import (
     Counts,
     LinkUse,
     Outcome,
+    StreamUse,
     check_not_late,
 )
 from tieline.network.ns3.build import built
@@ -23,6 +24,7 @@ from tieline.network.packet.draws import jitters
 from tieline.network.packet.endings import Endings
 from tieline.network.packet.memory import END_FLOW, END_HOW, END_TIME
 from tieline.network.packet.pmu import Pmu
+from tieline.network.packet.supplies import JITTER
 from tieline.network.spec import FRAME_BYTES, NetworkSpec
 
 
@@ -56,7 +58,7 @@ class Ns3Engine:
         self._now_ns = -1
         self._sent = 0
         self._max_queue = np.zeros(len(spec.ports), dtype=np.int64)
-        self._network, self._filled = built(spec, seed)
+        self._network, self._filled, self._streams = built(spec, seed)
 
     def send(
         self,
@@ -138,6 +140,12 @@ class Ns3Engine:
         self._network.BeginSpan()
         return counters
 
+    def streams(self) -> list[StreamUse]:
+        """Return every random stream; ns-3 counts only those of PMUs' jitter."""
+        pmus = [pmu.use() for pmu in self._pmus]
+        others = [StreamUse(name, gives, None) for name, gives in self._streams]
+        return [use for use in pmus if use] + others + self._processing.uses()
+
     def close(self) -> None:
         """Let go of all that ns-3 holds; again does nothing."""
         self._network = None
@@ -172,8 +180,14 @@ class _Processing:
         self._processing_ns = np.array(
             [place.processing_ns for place in spec.destinations], dtype=np.int64
         )
+        self._names = {
+            number: f"processing of {place.name}"
+            for number, place in enumerate(spec.destinations)
+            if place.jitter is not None
+        }
+        self._taken = dict.fromkeys(self._names, 0)
         self._chunks = {
-            number: jitters(seed, f"processing of {place.name}", place.jitter)
+            number: jitters(seed, self._names[number], place.jitter)
             for number, place in enumerate(spec.destinations)
             if place.jitter is not None
         }
@@ -192,5 +206,12 @@ class _Processing:
     def _take(self, number: int, count: int) -> NDArray[np.int64]:
         while len(self._drawn[number]) < count:
             self._drawn[number] = np.append(self._drawn[number], next(self._chunks[number]))
+        self._taken[number] += count
         taken, self._drawn[number] = np.split(self._drawn[number], [count])
         return taken
+
+    def uses(self) -> list[StreamUse]:
+        """Return the stream of each controller's jitter, with the numbers used so far."""
+        return [
+            StreamUse(name, JITTER, self._taken[number]) for number, name in self._names.items()
+        ]

@@ -55,7 +55,7 @@ from tieline.network.packet.memory import (
 )
 from tieline.network.packet.red import CERTAIN, ONE_PACKET
 from tieline.network.packet.routes import FRAME_WINDOW, Routes
-from tieline.network.packet.supplies import Supplies
+from tieline.network.packet.supplies import EARLY_DROPS, GAPS, LOSSES, SIZES, Supplies
 from tieline.network.queues.base import NO_LIMIT, EarlyDetection
 from tieline.network.spec import Link, NetworkSpec
 from tieline.network.traffic.base import Acknowledged, Answered
@@ -167,7 +167,11 @@ class _Ports:
         if link.queue.early_detection is not None:
             row[SPECIAL] |= HAS_RED
             row[RED] = len(self.red)
-            draws = self._supplies.open(uniforms(self._supplies.seed, f"early drops of {name}"))
+            draws = self._supplies.open(
+                uniforms(self._supplies.seed, f"early drops of {name}"),
+                f"early drops of {name}",
+                EARLY_DROPS,
+            )
             self.red.append(_red(link.queue.early_detection, draws))
 
     def _losses(self, row: Cells, loss: Loss | None, name: str) -> None:
@@ -176,7 +180,7 @@ class _Ports:
         row[SPECIAL] |= HAS_LOSS
         row[LOSS_UNIT] = PER_BIT if loss.counts == "bits" else PER_PACKET
         generator = stream(self._supplies.seed, f"loss of {name}")
-        row[LOSS_STREAM] = self._supplies.open(loss.gaps(generator))
+        row[LOSS_STREAM] = self._supplies.open(loss.gaps(generator), f"loss of {name}", LOSSES)
 
 
 def _red(early: EarlyDetection, draws: int) -> tuple[int, ...]:
@@ -207,10 +211,10 @@ def _cross(spec: NetworkSpec, supplies: Supplies, routes: Routes) -> Cells:
     table[:, [GAP_STREAM, SIZE_STREAM, REPLY]] = NONE
     table[:, ARRIVED:] = 0
     for number, (row, flow) in enumerate(zip(table, spec.cross_flows, strict=False)):
-        row[GAP_STREAM] = supplies.open(gaps(supplies.seed, flow))
+        row[GAP_STREAM] = supplies.open(gaps(supplies.seed, flow), f"arrivals of {flow.name}", GAPS)
         own_sizes = sizes(flow)
         if own_sizes is not None:
-            row[SIZE_STREAM] = supplies.open(own_sizes)
+            row[SIZE_STREAM] = supplies.open(own_sizes, f"sizes of {flow.name}", SIZES)
         if isinstance(flow.traffic, Answered):
             row[REPLY] = routes.back_of[len(spec.flows) + number]
             row[THINK] = flow.traffic.think_ns

@@ -5,7 +5,6 @@ A change comes before every other event of its instant.
 
 import numpy as np
 
-from tieline.network.draws import Chunks
 from tieline.network.engine import LINK_DOWN
 from tieline.network.losses import Bernoulli
 from tieline.network.packet.events import ARRIVAL, DEPARTURE, KINDS
@@ -53,7 +52,7 @@ from tieline.network.packet.memory import (
 )
 from tieline.network.packet.packets import dropped
 from tieline.network.packet.routes import Routes
-from tieline.network.packet.supplies import Supplies
+from tieline.network.packet.supplies import LOSSES, Supplies
 from tieline.network.spec import (
     LinkCut,
     LinkRepair,
@@ -83,7 +82,7 @@ class Changes:
         self._reroutes = list(routes.reroutes)
         self._spec = spec
         self._streams = {
-            (place, port): supplies.open(_event_losses(supplies.seed, place, change, port, spec))
+            (place, port): _open_losses(supplies, place, change, port, spec)
             for place, change in enumerate(spec.changes)
             if isinstance(change, LossChange) and change.probability > 0
             for port in _ports(change.link)
@@ -135,14 +134,15 @@ def _ports(link: int) -> tuple[int, int]:
     return 2 * link, 2 * link + 1
 
 
-def _event_losses(
-    seed: int, place: int, change: LossChange, port: int, spec: NetworkSpec
-) -> Chunks:
-    """Return the gaps between the losses of an event."""
+def _open_losses(
+    supplies: Supplies, place: int, change: LossChange, port: int, spec: NetworkSpec
+) -> int:
+    """Return the stream of the gaps between the losses of an event."""
     link = spec.links[change.link]
     origin, target = (link.a, link.b) if port % 2 == 0 else (link.b, link.a)
-    generator = stream(seed, f"loss of {origin}->{target} by change {place}")
-    return Bernoulli(change.probability).gaps(generator)
+    name = f"loss of {origin}->{target} by change {place}"
+    gaps = Bernoulli(change.probability).gaps(stream(supplies.seed, name))
+    return supplies.open(gaps, name, LOSSES)
 
 
 def _cut(now: int, port: int, memory: Memory) -> None:

@@ -12,6 +12,7 @@ from tieline.network.engine import (
     Counts,
     LinkUse,
     Outcome,
+    StreamUse,
     check_not_late,
 )
 from tieline.network.packet import kernel, tcp
@@ -184,6 +185,11 @@ class PacketEngine:
         ports[:, MAX_QUEUE] = counters["queue"]
         return counters
 
+    def streams(self) -> list[StreamUse]:
+        """Return every random stream, with the numbers used up to the last `run_until`."""
+        pmus = [pmu.use() for pmu in self._pmus]
+        return [use for use in pmus if use] + self._supplies.uses(self._memory.table("streams"))
+
     def close(self) -> None:
         """Do nothing: there is nothing to let go of."""
 
@@ -264,5 +270,5 @@ class PacketEngine:
             streams[number, USED] -= CHUNK
             draws = streams[number, FIRST_DRAW:]
             draws[:CHUNK] = draws[CHUNK:]
-            draws[CHUNK:] = next(self._supplies.chunks[number])
+            draws[CHUNK:] = self._supplies.refill(int(number))
         self._memory.control[WANTS_DRAWS] = 0

@@ -94,24 +94,35 @@ def run(until_ns: int, cells: Cells, at: Layout) -> int:
             if safe == 0:
                 return NEEDS_ROOM
         safe -= 1
-        now = cells[at.heap + TIME]
-        item = cells[at.heap + ITEM]
-        kind, number = item & (KINDS - 1), item >> KIND_BITS
-        if kind == ARRIVAL:
-            _arrive(now, number, cells, at)
-        elif kind == CROSS:
-            _send_cross(now, number, cells, at)
-        else:
-            pop_event(cells, at)
-            if kind == FRAME:
-                _send_frame(now, number, cells, at)
-            elif kind == DEPARTURE:
-                depart(now, number, cells, at)
-            elif kind == TIMER:
-                tcp.on_timer(now, number, cells, at)
-            else:
-                _reply(now, number, cells, at)
+        _process_first(cells, at)
     return DONE
+
+
+@compiled
+def step(cells: Cells, at: Layout) -> None:
+    """Process the first event alone; there must be one, and room and draws for it."""
+    _process_first(cells, at)
+
+
+@inlined
+def _process_first(cells: Cells, at: Layout) -> None:
+    now = cells[at.heap + TIME]
+    item = cells[at.heap + ITEM]
+    kind, number = item & (KINDS - 1), item >> KIND_BITS
+    if kind == ARRIVAL:
+        _arrive(now, number, cells, at)
+    elif kind == CROSS:
+        _send_cross(now, number, cells, at)
+    else:
+        pop_event(cells, at)
+        if kind == FRAME:
+            _send_frame(now, number, cells, at)
+        elif kind == DEPARTURE:
+            depart(now, number, cells, at)
+        elif kind == TIMER:
+            tcp.on_timer(now, number, cells, at)
+        else:
+            _reply(now, number, cells, at)
 
 
 @compiled
