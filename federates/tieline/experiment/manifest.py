@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import tieline
+from tieline.cosim.strangers import dropped_messages
 from tieline.experiment.launch import Outcome
 from tieline.experiment.plan import Plan, PlannedRun
 from tieline.experiment.results import FORMAT, MANIFEST, table_hash
@@ -131,10 +132,14 @@ def save_manifest(folder: pathlib.Path, manifest: Mapping[str, Any]) -> None:
 
 
 def run_facts(outcome: Outcome | None, folder: pathlib.Path) -> dict[str, Any]:
-    """Return what a launch found out (if it got so far) and the content hash of every table."""
+    """Return what a launch found out (if it got so far) and the content hash of every table.
+
+    `dropped_messages` counts, by endpoint and source, what others sent there without being asked.
+    """
     hashes = {path.name: table_hash(path) for path in sorted(folder.glob("*.parquet"))}
+    dropped = dropped_messages(folder)
     if outcome is None:
-        return {"tables": hashes}
+        return {"tables": hashes, "dropped_messages": dropped}
     return {
         "granted_ns": outcome.granted_ns,
         "times": {
@@ -144,4 +149,5 @@ def run_facts(outcome: Outcome | None, folder: pathlib.Path) -> dict[str, Any]:
         },
         "peak_memory_bytes": {use.name: use.peak_bytes for use in outcome.processes},
         "tables": hashes,
+        "dropped_messages": dropped,
     }

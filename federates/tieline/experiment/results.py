@@ -20,6 +20,13 @@ POINTS = "points"
 MAP = "map.json"
 FORMAT = "tieline-result/1"
 
+_OF_ALL: dict[str, type] = {"status": str, "name": str}
+_OF_KIND: dict[str, dict[str, type]] = {
+    "run": {"label": str, "config": dict},
+    "sweep": {"points": list},
+}
+"""What the readers take from a manifest of each kind, whoever made it."""
+
 
 @dataclass(frozen=True)
 class Run:
@@ -104,7 +111,7 @@ def read_json(path: Path) -> Any:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: is no JSON ({error})") from error
 
 
@@ -121,12 +128,27 @@ def read_manifest(folder: Path) -> Mapping[str, Any]:
     """Return the manifest of a run or a sweep.
 
     Raises:
-        InputError: the folder is no result.
+        InputError: the folder is no result, or its manifest lacks what every one has.
     """
     if not is_result(folder):
         raise InputError(f"{folder} is no result folder: it has no {MANIFEST} of {FORMAT}")
     manifest: Mapping[str, Any] = read_json(folder / MANIFEST)
+    _check_manifest(folder / MANIFEST, manifest)
     return manifest
+
+
+def _check_manifest(path: Path, manifest: Mapping[str, Any]) -> None:
+    kind = manifest.get("kind")
+    if not isinstance(kind, str) or kind not in _OF_KIND:
+        raise InputError(f"{path}: is damaged: its 'kind' is {kind!r:.60}")
+    for key, type_ in (_OF_ALL | _OF_KIND[kind]).items():
+        if not isinstance(manifest.get(key), type_):
+            raise InputError(f"{path}: is damaged: its '{key}' is {manifest.get(key)!r:.60}")
+    for point in manifest["points"] if kind == "sweep" else ():
+        slug = point.get("slug") if isinstance(point, dict) else None
+        # A point's folder stands beside its fellows, and nowhere else.
+        if not isinstance(slug, str) or Path(slug).name != slug or "\0" in slug:
+            raise InputError(f"{path}: is damaged: a point's 'slug' is {slug!r:.60}")
 
 
 def read_runs(folder: Path) -> list[Run]:

@@ -29,8 +29,7 @@ from tieline.grid.simulation import Grid, Reading
 from tieline.grid.system import build_system, sensor_average
 from tieline.tables import Column, write_table
 from tieline.units import NS_PER_S, seconds_to_ns, tick_ns
-from tieline.wams import PmuReporter, WideAreaAverage
-from tieline.wams.coi import Fate, Readings
+from tieline.wams import Fate, PmuReporter, Readings, WideAreaAverage
 from tieline.wams.settings import WamsSettings
 
 _TAG_ROUNDING_NS = 500
