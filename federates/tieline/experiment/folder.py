@@ -18,6 +18,13 @@ UNDER_WAY = "the run did not end: it is under way, or was killed"
 OLDER = ".older"
 """Ends the name of an earlier result on its way out, where two folders cannot change places."""
 
+_OF_ALL: dict[str, type] = {"status": str, "name": str}
+_OF_KIND: dict[str, dict[str, type]] = {
+    "run": {"label": str, "config": dict},
+    "sweep": {"points": list},
+}
+"""What the readers take from a manifest of each kind, whoever made it."""
+
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2
 _NOT_LOCKABLE = (errno.ENOLCK, errno.EBADF, errno.EOPNOTSUPP)
@@ -33,7 +40,7 @@ def read_json(path: Path) -> Any:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: is no JSON ({error})") from error
 
 
@@ -62,12 +69,27 @@ def read_manifest(folder: Path) -> Mapping[str, Any]:
     """Return the manifest of a run or a sweep.
 
     Raises:
-        InputError: the folder is no result.
+        InputError: the folder is no result, or its manifest lacks what every one has.
     """
     if not is_result(folder):
         raise InputError(f"{folder} is no result folder: it has no {MANIFEST} of {FORMAT}")
     manifest: Mapping[str, Any] = read_json(folder / MANIFEST)
+    _check_manifest(folder / MANIFEST, manifest)
     return manifest
+
+
+def _check_manifest(path: Path, manifest: Mapping[str, Any]) -> None:
+    kind = manifest.get("kind")
+    if not isinstance(kind, str) or kind not in _OF_KIND:
+        raise InputError(f"{path}: is damaged: its 'kind' is {kind!r:.60}")
+    for key, type_ in (_OF_ALL | _OF_KIND[kind]).items():
+        if not isinstance(manifest.get(key), type_):
+            raise InputError(f"{path}: is damaged: its '{key}' is {manifest.get(key)!r:.60}")
+    for point in manifest["points"] if kind == "sweep" else ():
+        slug = point.get("slug") if isinstance(point, dict) else None
+        # A point's folder stands beside its fellows, and nowhere else.
+        if not isinstance(slug, str) or Path(slug).name != slug or "\0" in slug:
+            raise InputError(f"{path}: is damaged: a point's 'slug' is {slug!r:.60}")
 
 
 def put_in_place(work: Path, place: Path) -> None:
@@ -91,7 +113,7 @@ def put_in_place(work: Path, place: Path) -> None:
 
 def place_of_incomplete(place: Path) -> Path:
     """Return where an incomplete result belongs: it overwrites nothing whole."""
-    has_whole = is_result(place) and read_manifest(place)["status"] == "complete"
+    has_whole = is_result(place) and read_json(place / MANIFEST).get("status") == "complete"
     return place.with_name(f"{place.name}-incomplete") if has_whole else place
 
 

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import tieline
+from tieline.cosim.strangers import dropped_messages
 from tieline.experiment.folder import FORMAT, MANIFEST, write_json
 from tieline.experiment.launch import Outcome
 from tieline.experiment.plan import Plan, PlannedRun
@@ -141,8 +142,15 @@ def random_streams(seed: int, folder: pathlib.Path) -> dict[str, Any]:
 
 
 def run_facts(outcome: Outcome | None, folder: pathlib.Path, seed: int) -> dict[str, Any]:
-    """Return what a launch found out (if it got so far), `table_facts` and the random streams."""
-    facts = {**table_facts(folder), "random_streams": random_streams(seed, folder)}
+    """Return what a launch found out (if it got so far), `table_facts` and the random streams.
+
+    `dropped_messages` counts, by endpoint and source, what others sent there without being asked.
+    """
+    facts = {
+        **table_facts(folder),
+        "random_streams": random_streams(seed, folder),
+        "dropped_messages": dropped_messages(folder),
+    }
     if outcome is None:
         return facts
     return {
