@@ -214,7 +214,7 @@ def _array(kind: pa.DataType, values: NDArray[np.generic]) -> pa.Array:
     `pa.array` would do as much for an array, but imports pandas for it.
     """
     if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
-        return pa.array(values.tolist(), kind)
+        return pa.array(values.tolist(), kind, from_pandas=True)
     data = np.ascontiguousarray(values, kind.to_pandas_dtype())
     valid, nulls = None, 0
     if pa.types.is_floating(kind):

@@ -109,9 +109,9 @@ def prepared(study: "Study") -> "Plan":
 
 def launcher() -> "Launch":
     """Return what starts the federates."""
-    from tieline.experiment.launch import launch
+    from tieline.sweeps.single import launch_here
 
-    return launch
+    return launch_here
 
 
 def sweep_runner(plan: "Plan", jobs: int | None, scheduler: str | None) -> "Runner":
