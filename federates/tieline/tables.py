@@ -214,6 +214,7 @@ def write_table(path: Path, columns: Sequence[Column], data: Mapping[str, ArrayL
 
 def read_table(path: Path, columns: Sequence[str] | None = None) -> "pd.DataFrame":
     """Return a table, or some of its columns; nulls in a column of floats become NaN."""
+    # Federates write tables and read none: they should not wait for pandas.
     import pandas as pd
 
     if path.suffix == _STREAM_SUFFIX:
@@ -265,8 +266,25 @@ def _arrow_type(dtype: str) -> pa.DataType:
 
 
 def _batch(schema: pa.Schema, arrays: Mapping[str, NDArray[np.generic]]) -> pa.RecordBatch:
-    columns = [pa.array(arrays[field.name], field.type, from_pandas=True) for field in schema]
+    columns = [_array(field.type, arrays[field.name]) for field in schema]
     return pa.RecordBatch.from_arrays(columns, schema=schema)
+
+
+def _array(kind: pa.DataType, values: NDArray[np.generic]) -> pa.Array:
+    """Return values as Arrow has them, NaN as null.
+
+    `pa.array` would do as much for an array, but imports pandas for it.
+    """
+    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
+        return pa.array(values.tolist(), kind, from_pandas=True)
+    data = np.ascontiguousarray(values, kind.to_pandas_dtype())
+    valid, nulls = None, 0
+    if pa.types.is_floating(kind):
+        is_missing = np.isnan(data)
+        nulls = int(is_missing.sum())
+        if nulls:
+            valid = pa.py_buffer(np.packbits(~is_missing, bitorder="little"))
+    return pa.Array.from_buffers(kind, len(data), [valid, pa.py_buffer(data)], nulls)
 
 
 def _common_length(
