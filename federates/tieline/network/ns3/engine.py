@@ -22,7 +22,7 @@ from tieline.network.ns3.build import built
 from tieline.network.packet.draws import jitters
 from tieline.network.packet.endings import Endings
 from tieline.network.packet.memory import END_FLOW, END_HOW, END_TIME
-from tieline.network.packet.pmu import Pmu
+from tieline.network.packet.pmu import Pmus
 from tieline.network.spec import FRAME_BYTES, NetworkSpec
 
 
@@ -48,7 +48,7 @@ class Ns3Engine:
 
     def __init__(self, spec: NetworkSpec, seed: int) -> None:
         self._spec = spec
-        self._pmus = [Pmu(source, seed) for source in spec.sources]
+        self._pmus = Pmus(spec.sources, seed)
         self._processing = _Processing(spec, seed)
         self._endings = Endings(spec)
         self._flows_of = self._endings.flows_of_sources()
@@ -73,8 +73,9 @@ class Ns3Engine:
         check_not_late(measured_ns + self.lookahead_ns, self._now_ns)
         if payloads is None:
             payloads = np.zeros((len(sources), FRAME_BYTES), np.uint8)
-        for source, payload in zip(sources.tolist(), np.ascontiguousarray(payloads), strict=True):
-            ready_ns = self._pmus[source].ready_ns(measured_ns)
+        ready = self._pmus.ready_ns(measured_ns, sources).tolist()
+        frames = np.ascontiguousarray(payloads)
+        for source, ready_ns, payload in zip(sources.tolist(), ready, frames, strict=True):
             self._network.Announce(ready_ns, source, sequence, payload, len(payload))
         self._sent += int(self._flows_of[sources].sum())
 
@@ -95,7 +96,8 @@ class Ns3Engine:
             raise CosimError(f"ns-3 at {until_ns} ns: {fault}")
         rows = _table(self._network.CollectEnded, self._network.EndedCount(), 4)
         self._processing.add_to(rows)
-        outcome = self._endings.outcome(rows, until_ns)
+        self._endings.take(rows)
+        outcome = self._endings.outcome(until_ns)
         self.counts().check(until_ns)
         return outcome
 

@@ -1,28 +1,57 @@
-"""When the frames of a PMU enter the network."""
+"""When the frames of the PMUs enter the network."""
 
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tieline.network.draws import CHUNK
 from tieline.network.packet.draws import jitters
 from tieline.network.spec import Source
 
 
-class Pmu:
-    """When a source's frames leave it: after its processing time, and in order."""
+class Pmus:
+    """When the frames of sources leave them: after their processing time, and in order.
 
-    def __init__(self, source: Source, seed: int) -> None:
-        self._processing_ns = source.processing_ns
-        self._chunks = (
-            None
-            if source.jitter is None
-            else jitters(seed, f"processing of {source.name}", source.jitter)
-        )
-        self._chunk: list[int] = []
-        self._last_ns = -1
+    Args:
+        sources: all sources, by number.
+        seed: the experiment's seed; the jitter of each source has its own stream of it.
+    """
 
-    def ready_ns(self, measured_ns: int) -> int:
-        """Return when the frame measured at an instant leaves."""
-        ready_ns = measured_ns + self._processing_ns
-        if self._chunks is not None:
-            if not self._chunk:
-                self._chunk = next(self._chunks).tolist()[::-1]
-            ready_ns += self._chunk.pop()
-        self._last_ns = max(self._last_ns, ready_ns)
-        return self._last_ns
+    def __init__(self, sources: Sequence[Source], seed: int) -> None:
+        self._processing_ns = np.array([source.processing_ns for source in sources], np.int64)
+        self._last_ns = np.full(len(sources), -1, dtype=np.int64)
+        random = [number for number, source in enumerate(sources) if source.jitter is not None]
+        self._row_of = np.full(len(sources), -1, dtype=np.int64)
+        self._row_of[random] = np.arange(len(random))
+        self._supplies = [
+            jitters(seed, f"processing of {sources[number].name}", jitter)
+            for number in random
+            if (jitter := sources[number].jitter) is not None
+        ]
+        self._draws = np.empty((len(random), CHUNK), dtype=np.int64)
+        self._used = np.full(len(random), CHUNK)
+
+    def ready_ns(self, measured_ns: int, sources: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return when the frames leave that some sources, each given once, measured at an instant.
+
+        Args:
+            measured_ns: the instant.
+            sources: (n,) their numbers.
+        """
+        ready_ns = measured_ns + self._processing_ns[sources]
+        rows = self._row_of[sources]
+        is_random = rows >= 0
+        ready_ns[is_random] += self._drawn(rows[is_random])
+        ready_ns = np.maximum(ready_ns, self._last_ns[sources])
+        self._last_ns[sources] = ready_ns
+        return ready_ns
+
+    def _drawn(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the next number of each of some supplies."""
+        for row in rows[self._used[rows] == CHUNK]:
+            self._draws[row] = next(self._supplies[row])
+            self._used[row] = 0
+        drawn: NDArray[np.int64] = self._draws[rows, self._used[rows]]
+        self._used[rows] += 1
+        return drawn
