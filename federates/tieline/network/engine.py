@@ -226,10 +226,26 @@ def check_not_late(enters_ns: int, now_ns: int) -> None:
         )
 
 
+def order_of(times_ns: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the places (n,) of instants (n,) in ascending order, equal ones as they stand."""
+    if not len(times_ns):
+        return np.empty(0, dtype=np.int64)
+    first_ns = times_ns.min()
+    bits = len(times_ns).bit_length()
+    if int(times_ns.max()) - int(first_ns) >= 1 << (63 - bits):
+        return np.argsort(times_ns, kind="stable")
+    # One number for instant and place: sorting numbers is several times as fast as their places.
+    keys = (times_ns - first_ns) << bits
+    keys += np.arange(len(times_ns))
+    keys.sort()
+    keys &= (1 << bits) - 1
+    return keys
+
+
 def in_order(arrivals: NDArray[np.void]) -> NDArray[np.void]:
     """Return arrivals in the total order (arrival_ns, source, sequence, destination)."""
     times_ns = arrivals["arrival_ns"]
-    order = np.argsort(times_ns)
+    order = order_of(times_ns)
     if not np.any(times_ns[order[1:]] == times_ns[order[:-1]]):
         return arrivals[order]
     # 16 + 32 + 16 bits hold the three lesser keys as one unsigned number.

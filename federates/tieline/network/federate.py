@@ -4,12 +4,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tieline.cosim.interfaces import DELIVERY, NETWORK, Clock, DeliveryBundle, FrameBundle
+from tieline.cosim.interfaces import NETWORK, Clock, DeliveryBundle, FrameBundle
 from tieline.errors import CosimError, TimeContractBroken
 from tieline.network.captures import Captures
 from tieline.network.engine import Engine, Outcome, joined
+from tieline.network.frames import FrameStore
 from tieline.network.linkless import open_without_links
 from tieline.network.ns3 import Ns3Engine
 from tieline.network.packet import PacketEngine
@@ -71,7 +71,7 @@ class NetworkParticipant:
         self._engine = engine
         self._recorder = recorder
         self._captures = captures
-        self._frames = _FrameStore(len(spec.destinations))
+        self._frames = FrameStore(len(spec.sources), len(spec.destinations))
 
     def start(self) -> list[bytes]:
         """Return the deliveries of the first intervals, in which no frame can matter."""
@@ -137,63 +137,5 @@ class NetworkParticipant:
             )
 
     def _bundle(self, outcome: Outcome, until_ns: int) -> DeliveryBundle:
-        payloads, rows = self._frames.take(outcome)
-        records = np.empty(len(outcome.arrivals), DELIVERY)
-        for field in outcome.arrivals.dtype.names or ():
-            records[field] = outcome.arrivals[field]
-        records["payload"] = rows
-        return DeliveryBundle(until_ns, records, payloads)
-
-
-class _FrameStore:
-    """The bytes of the frames that some packet still carries, by sequence number."""
-
-    def __init__(self, destinations: int) -> None:
-        self._destinations = destinations
-        self._payloads: dict[int, NDArray[np.uint8]] = {}
-        self._under_way: dict[int, int] = {}
-
-    def keep(self, sequence: int, payloads: NDArray[np.uint8]) -> None:
-        """Keep the frames of one instant, one packet to each destination."""
-        self._payloads[sequence] = payloads
-        self._under_way[sequence] = len(payloads) * self._destinations
-
-    def payloads_of(
-        self, sources: NDArray[np.int64], sequences: NDArray[np.int64]
-    ) -> NDArray[np.uint8]:
-        """Return the frames (n, size) of sources and sequence numbers (n,)."""
-        frames = np.empty((len(sources), FRAME_BYTES), np.uint8)
-        for sequence in np.unique(sequences):
-            is_own = sequences == sequence
-            frames[is_own] = self._payloads[int(sequence)][sources[is_own]]
-        return frames
-
-    def take(self, outcome: Outcome) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
-        """Return the table of payloads that arrived, each once, and the row of each arrival."""
-        sequences = outcome.arrivals["sequence"].astype(np.int64)
-        parts = [np.empty((0, FRAME_BYTES), np.uint8)]
-        rows = np.empty(len(sequences), np.int64)
-        first = 0
-        for sequence, _ in self._counted(sequences):
-            payloads = self._payloads[sequence]
-            is_own = sequences == sequence
-            sources = outcome.arrivals["source"][is_own]
-            arrived = np.bincount(sources, minlength=len(payloads)) > 0
-            rows[is_own] = first + np.cumsum(arrived)[sources] - 1
-            parts.append(payloads[arrived])
-            first += len(parts[-1])
-        self._forget(np.concatenate([sequences, outcome.drops["sequence"]]))
-        return np.concatenate(parts), rows
-
-    def _forget(self, ended: NDArray[np.int64]) -> None:
-        """Let go of the frames whose last packet has ended."""
-        for sequence, count in self._counted(ended):
-            self._under_way[sequence] -= count
-            if self._under_way[sequence] == 0:
-                del self._payloads[sequence], self._under_way[sequence]
-
-    def _counted(self, sequences: NDArray[np.int64]) -> list[tuple[int, int]]:
-        """Return each sequence number that occurs and how often, in ascending order."""
-        base = next(iter(self._payloads), 0)
-        counts = np.bincount(sequences - base)
-        return [(base + int(place), int(counts[place])) for place in np.flatnonzero(counts)]
+        payloads, deliveries = self._frames.take(outcome)
+        return DeliveryBundle(until_ns, deliveries, payloads)

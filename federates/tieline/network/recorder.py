@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tieline.network.age import AgeOfInformation
+from tieline.network.ended import ended
 from tieline.network.engine import NO_ARRIVALS, NO_DROPS, Engine, Outcome
 from tieline.network.results import PacketLog, write_ages, write_delays, write_flows, write_links
 from tieline.network.series import ControllerSeries, LinkSeries
 from tieline.network.spec import NetworkSpec, least_delay_ns
 from tieline.network.stats import FlowStatistics
 from tieline.network.streams_used import STREAMS, write_streams
-from tieline.units import NS_PER_S
 
 
 class Recorder:
@@ -48,7 +48,7 @@ class Recorder:
         least_ns = [least_delay_ns(spec, flow) for flow in spec.flows]
         self._flows = FlowStatistics(np.array(least_ns, dtype=np.int64), flow_of)
         self._age = AgeOfInformation(len(spec.flows))
-        self._log = PacketLog(folder / "packets.parquet", flow_of) if record_packets else None
+        self._log = PacketLog(folder / "packets.parquet") if record_packets else None
         self._window_ns = window_ns
         self._windows = 0
         self._until_ns = 0
@@ -79,15 +79,15 @@ class Recorder:
             CosimError: a packet ended twice.
         """
         arrivals, drops = outcome.arrivals, outcome.drops
-        measured_ns = self._measured_ns(arrivals)
+        arrived = ended(arrivals, self._flow_of, self._rate_hz)
+        lost = ended(drops, self._flow_of, self._rate_hz)
         self._until_ns = until_ns
-        self._flows.add(outcome, measured_ns)
-        flows = self._flow_of[arrivals["source"], arrivals["destination"]]
-        self._age.add(flows, arrivals["arrival_ns"], measured_ns)
+        self._flows.add(arrived, lost, drops["reason"])
+        self._age.add(arrived.flows, arrived.ended_ns, arrived.measured_ns)
         if self._log is not None:
-            self._log.add(outcome, measured_ns, self._measured_ns(drops))
+            self._log.add(arrived, lost, drops["reason"])
         if self._window_ns is not None:
-            self._controllers.add(arrivals, arrivals["arrival_ns"] - measured_ns, drops)
+            self._controllers.add(arrivals["destination"], arrived.delays_ns, drops)
             if until_ns == (self._windows + 1) * self._window_ns:
                 self._close_window(self._window_ns)
 
@@ -116,6 +116,3 @@ class Recorder:
         self._links.close_window(self._until_ns, length_ns)
         self._controllers.close_window(self._until_ns, self._age.measured_ns)
         self._windows += 1
-
-    def _measured_ns(self, records: NDArray[np.void]) -> NDArray[np.int64]:
-        return records["sequence"].astype(np.int64) * NS_PER_S // self._rate_hz

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tieline.network.age import NEVER, AgeOfInformation
-from tieline.network.engine import DELIVERED, LinkUse, Outcome
+from tieline.network.ended import Ended
+from tieline.network.engine import DELIVERED, LinkUse, order_of
 from tieline.network.spec import NetworkSpec
 from tieline.network.stats import DELAY_BIN_NS, DELAY_BINS, FlowStatistics
 from tieline.tables import Column, TableStream, write_table
@@ -204,42 +205,30 @@ def write_delays(path: Path, statistics: FlowStatistics) -> None:
 class PacketLog:
     """packets.parquet, written as packets end; those in flight at the end have no row."""
 
-    def __init__(self, path: Path, flow_of: NDArray[np.int64]) -> None:
+    def __init__(self, path: Path) -> None:
         self._stream = TableStream(path, PACKET_COLUMNS)
-        self._flow_of = flow_of
 
-    def add(
-        self,
-        outcome: Outcome,
-        arrivals_measured_ns: NDArray[np.int64],
-        drops_measured_ns: NDArray[np.int64],
-    ) -> None:
-        """Add the packets of an outcome, with the instants at which they were measured.
+    def add(self, arrived: Ended, lost: Ended, reasons: NDArray[np.uint8]) -> None:
+        """Add the packets of an outcome.
 
         They stand in the order in which they ended, arrivals before drops of the same instant.
         """
-        arrivals, drops = outcome.arrivals, outcome.drops
-        ended_ns = np.concatenate([arrivals["arrival_ns"], drops["dropped_ns"]])
-        order = np.argsort(ended_ns, kind="stable")
-        delivered = np.full(len(arrivals), DELIVERED, dtype=np.uint8)
-        measured_ns = np.concatenate([arrivals_measured_ns, drops_measured_ns])
-        sequences = np.concatenate([arrivals["sequence"], drops["sequence"]])
+        both = Ended(*(np.concatenate(columns) for columns in zip(arrived, lost, strict=True)))
+        delivered = np.full(len(arrived.flows), DELIVERED, dtype=np.uint8)
+        order = order_of(both.ended_ns)
         self._stream.append(
             {
-                "flow": np.concatenate([self._flows(arrivals), self._flows(drops)])[order],
-                "sequence": sequences.astype(np.int64)[order],
-                "measured_ns": measured_ns[order],
-                "ended_ns": ended_ns[order],
-                "outcome": np.concatenate([delivered, drops["reason"]])[order],
+                "flow": both.flows[order],
+                "sequence": both.sequences[order],
+                "measured_ns": both.measured_ns[order],
+                "ended_ns": both.ended_ns[order],
+                "outcome": np.concatenate([delivered, reasons])[order],
             }
         )
 
     def close(self) -> None:
         """Finish the file."""
         self._stream.close()
-
-    def _flows(self, records: NDArray[np.void]) -> NDArray[np.int64]:
-        return self._flow_of[records["source"], records["destination"]]
 
 
 def _counts(values: Iterable[int]) -> NDArray[np.int64]:

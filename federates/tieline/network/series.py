@@ -97,14 +97,17 @@ class ControllerSeries:
 
     def add(
         self,
-        arrivals: NDArray[np.void],
+        controllers: NDArray[np.uint16],
         delays_ns: NDArray[np.int64],
         drops: NDArray[np.void],
     ) -> None:
-        """Take what ended in the window."""
-        controllers = arrivals["destination"].astype(np.int64)
-        self._keys.append((controllers << _DELAY_BITS) | delays_ns)
-        self._lost += np.bincount(drops["destination"], minlength=len(self._lost))
+        """Take what ended in the window: to which controllers packets came, how late, and drops."""
+        keys = controllers.astype(np.int64)
+        keys <<= _DELAY_BITS
+        keys |= delays_ns
+        self._keys.append(keys)
+        if len(drops):
+            self._lost += np.bincount(drops["destination"], minlength=len(self._lost))
 
     def close_window(self, end_ns: int, measured_ns: NDArray[np.int64]) -> None:
         """Write the window.

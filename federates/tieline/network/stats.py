@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tieline.compiled import compiled
-from tieline.network.engine import LINK_DOWN, LOSS, NO_ARRIVALS, NO_DROPS, QUEUE_FULL, Outcome
+from tieline.network.ended import NONE_ENDED, Ended
+from tieline.network.engine import LINK_DOWN, LOSS, QUEUE_FULL
 from tieline.network.histogram import BINS, bin_of, percentile_ns
 from tieline.network.sequence import LOST, SequenceFigures, SequenceStatistics
 
@@ -48,7 +49,7 @@ class FlowStatistics:
         self._bins = np.zeros((flows, BINS), dtype=np.uint32)
         self._order = SequenceStatistics(flows)
         # Compiles, where that is still to be done, before the federation waits for an answer.
-        self.add(Outcome(NO_ARRIVALS, NO_DROPS), np.empty(0, np.int64))
+        self.add(NONE_ENDED, NONE_ENDED, np.empty(0, np.uint8))
 
     @property
     def delivered(self) -> NDArray[np.int64]:
@@ -67,36 +68,32 @@ class FlowStatistics:
         self.sent[flows] += 1
         self._order.add_sent(flows, sequence)
 
-    def add(self, outcome: Outcome, measured_ns: NDArray[np.int64]) -> None:
+    def add(self, arrived: Ended, lost: Ended, reasons: NDArray[np.uint8]) -> None:
         """Take what ended.
 
         Args:
-            outcome: arrivals in order, and drops.
-            measured_ns: (arrivals,) when each frame that arrived was measured.
+            arrived: packets in the order of their arrival.
+            lost: packets that were dropped.
+            reasons: why, of each.
 
         Raises:
             CosimError: a packet ended twice.
         """
-        arrivals, drops = outcome.arrivals, outcome.drops
-        flows = self._flow_of[arrivals["source"], arrivals["destination"]]
-        delays_ns = arrivals["arrival_ns"] - measured_ns
         _add_delays(
-            flows,
-            delays_ns,
+            arrived.flows,
+            arrived.delays_ns,
             self._least_ns,
             self._delays,
             self._smoothed_ns,
             self._bins,
             self.delay_counts,
         )
-        self._order.add(flows, arrivals["sequence"].astype(np.int64), delays_ns)
-        if len(drops):
-            dropped = self._flow_of[drops["source"], drops["destination"]]
-            np.add.at(self.dropped_queue, dropped[drops["reason"] == QUEUE_FULL], 1)
-            np.add.at(self.dropped_loss, dropped[drops["reason"] == LOSS], 1)
-            np.add.at(self.dropped_down, dropped[drops["reason"] == LINK_DOWN], 1)
-            ends = np.full(len(drops), LOST)
-            self._order.add(dropped, drops["sequence"].astype(np.int64), ends)
+        self._order.add(arrived.flows, arrived.sequences, arrived.delays_ns)
+        if len(reasons):
+            np.add.at(self.dropped_queue, lost.flows[reasons == QUEUE_FULL], 1)
+            np.add.at(self.dropped_loss, lost.flows[reasons == LOSS], 1)
+            np.add.at(self.dropped_down, lost.flows[reasons == LINK_DOWN], 1)
+            self._order.add(lost.flows, lost.sequences, np.full(len(reasons), LOST))
 
     def order(self) -> SequenceFigures:
         """Return what is defined over sequence numbers."""

@@ -23,7 +23,7 @@ from tieline.network.ns3.build import built
 from tieline.network.packet.draws import jitters
 from tieline.network.packet.endings import Endings
 from tieline.network.packet.memory import END_FLOW, END_HOW, END_TIME
-from tieline.network.packet.pmu import Pmu
+from tieline.network.packet.pmu import Pmus
 from tieline.network.packet.supplies import JITTER
 from tieline.network.spec import FRAME_BYTES, NetworkSpec
 
@@ -50,7 +50,7 @@ class Ns3Engine:
 
     def __init__(self, spec: NetworkSpec, seed: int) -> None:
         self._spec = spec
-        self._pmus = [Pmu(source, seed) for source in spec.sources]
+        self._pmus = Pmus(spec.sources, seed)
         self._processing = _Processing(spec, seed)
         self._endings = Endings(spec)
         self._flows_of = self._endings.flows_of_sources()
@@ -75,8 +75,9 @@ class Ns3Engine:
         check_not_late(measured_ns + self.lookahead_ns, self._now_ns)
         if payloads is None:
             payloads = np.zeros((len(sources), FRAME_BYTES), np.uint8)
-        for source, payload in zip(sources.tolist(), np.ascontiguousarray(payloads), strict=True):
-            ready_ns = self._pmus[source].ready_ns(measured_ns)
+        ready = self._pmus.ready_ns(measured_ns, sources).tolist()
+        frames = np.ascontiguousarray(payloads)
+        for source, ready_ns, payload in zip(sources.tolist(), ready, frames, strict=True):
             self._network.Announce(ready_ns, source, sequence, payload, len(payload))
         self._sent += int(self._flows_of[sources].sum())
 
@@ -97,7 +98,8 @@ class Ns3Engine:
             raise CosimError(f"ns-3 at {until_ns} ns: {fault}")
         rows = _table(self._network.CollectEnded, self._network.EndedCount(), 4)
         self._processing.add_to(rows)
-        outcome = self._endings.outcome(rows, until_ns)
+        self._endings.take(rows)
+        outcome = self._endings.outcome(until_ns)
         self.counts().check(until_ns)
         return outcome
 
@@ -142,9 +144,8 @@ class Ns3Engine:
 
     def streams(self) -> list[StreamUse]:
         """Return every random stream; ns-3 counts only those of PMUs' jitter."""
-        pmus = [pmu.use() for pmu in self._pmus]
         others = [StreamUse(name, gives, None) for name, gives in self._streams]
-        return [use for use in pmus if use] + others + self._processing.uses()
+        return self._pmus.uses() + others + self._processing.uses()
 
     def close(self) -> None:
         """Let go of all that ns-3 holds; again does nothing."""

@@ -151,7 +151,7 @@ def _cut(now: int, port: int, memory: Memory) -> None:
     inside = memory.inside()
     packets = memory.table("packets")
     hops = packets[inside, HOP]
-    lost = inside[memory.table("hops")[hops, HOP_PORT] == port]
+    lost = inside[memory.plans_of(hops)[:, HOP_PORT] == port]
     # By what they carry: slots depend on when the tables grew, and so on the caller's steps.
     lost = lost[np.lexsort((packets[lost, SEQUENCE], packets[lost, FLOW]))]
     _forget_events(memory, lost, port)
@@ -192,11 +192,11 @@ def _set_rate(change: RateChange, port: int, memory: Memory) -> Cells:
 
     Returns when the packets start that wait at a plain port.
     """
-    row, hops = memory.table("ports")[port], memory.table("hops")
-    own = (hops[:, HOP_PORT] == port) & (hops[:, HOP_SERVICE] != NONE)
-    before = hops[:, HOP_SERVICE].copy()
+    row, plans = memory.table("ports")[port], memory.table("plans")
+    own = (plans[:, HOP_PORT] == port) & (plans[:, HOP_SERVICE] != NONE)
+    before = plans[:, HOP_SERVICE].copy()
     old_rate, row[RATE] = int(row[RATE]), change.rate_bps
-    hops[own, HOP_SERVICE] = _service_ns(hops[own, HOP_BYTES], change.rate_bps)
+    plans[own, HOP_SERVICE] = _service_ns(plans[own, HOP_BYTES], change.rate_bps)
     if row[SPECIAL] & HAS_SERVER:
         return NOTHING
     return _set_starts(change.at_ns, port, before, old_rate, memory)
@@ -204,7 +204,7 @@ def _set_rate(change: RateChange, port: int, memory: Memory) -> Cells:
 
 def _set_starts(now: int, port: int, before: Cells, old_rate: int, memory: Memory) -> Cells:
     """Move the starts of what waits at a plain port, and the events that depend on them."""
-    row, hops = memory.table("ports")[port], memory.table("hops")
+    row, plans = memory.table("ports")[port], memory.table("plans")
     places = _waiting_places(row)
     ring = memory.table("ring")
     places = places[ring[places, 0] >= now]
@@ -215,14 +215,14 @@ def _set_starts(now: int, port: int, before: Cells, old_rate: int, memory: Memor
     is_arrival = events[:, ITEM] % KINDS == ARRIVAL
     packets = memory.table("packets")
     on_port = np.zeros(len(events), dtype=bool)
-    on_port[is_arrival] = hops[packets[slots[is_arrival], HOP], HOP_PORT] == port
+    on_port[is_arrival] = memory.plans_of(packets[slots[is_arrival], HOP])[:, HOP_PORT] == port
     # Events are ordered as packets came, and the last to come are those that wait.
     own = np.flatnonzero(on_port)
     waiting = own[np.argsort(events[own, ORDER])][-len(places) :]
     old_starts, sizes = ring[places, 0].copy(), ring[places, 1]
-    own_hops = packets[slots[waiting], HOP]
-    is_sized = hops[own_hops, HOP_SERVICE] == NONE
-    old = np.where(is_sized, _service_ns(sizes, old_rate), before[own_hops])
+    own_plans = memory.table("hops")[packets[slots[waiting], HOP], 0]
+    is_sized = plans[own_plans, HOP_SERVICE] == NONE
+    old = np.where(is_sized, _service_ns(sizes, old_rate), before[own_plans])
     new = _service_ns(sizes, int(row[RATE]))
     starts = old_starts[0] + np.cumsum(new) - new
     ring[places, 0] = starts

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from tieline.compiled import compiled
 from tieline.network.engine import LINK_COUNTER
+from tieline.network.packet.events import FRAME, KIND_BITS, KINDS
 from tieline.network.packet.memory import (
     BUSY,
     BYTES,
@@ -12,6 +13,9 @@ from tieline.network.packet.memory import (
     DOWN_DROPS,
     FREE_AT,
     HAS_SERVER,
+    HEAP_COLUMNS,
+    HEAP_SIZE,
+    ITEM,
     LOSS_DROPS,
     MAX_QUEUE,
     PACKETS,
@@ -36,6 +40,17 @@ def read_counters(now_ns: int, ports: int, cells: Cells, at: Layout) -> NDArray[
     counters = np.empty(ports, LINK_COUNTER)
     _read(now_ns, counters, cells, at)
     return counters
+
+
+@compiled
+def frames_announced(flows_of: Cells, cells: Cells, at: Layout) -> int:
+    """Return in how many flows frames wait at their PMUs to enter; `flows_of` counts a source's."""
+    waiting = 0
+    for place in range(cells[at.control + HEAP_SIZE]):
+        item = cells[at.heap + HEAP_COLUMNS * place + ITEM]
+        if item & (KINDS - 1) == FRAME:
+            waiting += flows_of[(item >> KIND_BITS) % at.source_count]
+    return waiting
 
 
 @compiled

@@ -17,7 +17,7 @@ from tieline.network.engine import (
 )
 from tieline.network.packet import kernel, tcp
 from tieline.network.packet.build import Supplies, laid_out
-from tieline.network.packet.counters import read_counters
+from tieline.network.packet.counters import frames_announced, read_counters
 from tieline.network.packet.endings import Endings
 from tieline.network.packet.events import CROSS, FRAME, KINDS
 from tieline.network.packet.memory import (
@@ -37,7 +37,6 @@ from tieline.network.packet.memory import (
     GAP_STREAM,
     HEAP_SIZE,
     HOP,
-    ITEM,
     LOSS_DROPS,
     MAX_QUEUE,
     NONE,
@@ -47,7 +46,7 @@ from tieline.network.packet.memory import (
     USED,
     WANTS_DRAWS,
 )
-from tieline.network.packet.pmu import Pmu
+from tieline.network.packet.pmu import Pmus
 from tieline.network.packet.taps import Taps
 from tieline.network.spec import NetworkSpec
 
@@ -74,12 +73,11 @@ class PacketEngine:
         self._supplies = Supplies(seed)
         self._memory, self._changes, routes = laid_out(spec, self._supplies)
         self._taps = Taps(self._memory, routes)
-        self._pmus = [Pmu(source, seed) for source in spec.sources]
+        self._pmus = Pmus(spec.sources, seed)
         self._endings = Endings(spec)
         self._flows_of = self._endings.flows_of_sources()
         self.lookahead_ns = spec.lookahead_ns
         self._now_ns = -1
-        self._rows: list[NDArray[np.int64]] = []
         self._sent = 0
         self._max_queue = np.zeros(len(spec.ports), dtype=np.int64)
         self._start_cross_flows()
@@ -97,9 +95,8 @@ class PacketEngine:
             CosimError: the last `run_until` has passed the instant at which a frame may enter.
         """
         check_not_late(measured_ns + self.lookahead_ns, self._now_ns)
-        ready = [self._pmus[source].ready_ns(measured_ns) for source in sources]
-        items = KINDS * (sequence * len(self._pmus) + sources) + FRAME
-        self._announce(np.array(ready, dtype=np.int64), items, kernel.FRAME_ORDER)
+        items = KINDS * (sequence * len(self._spec.sources) + sources) + FRAME
+        self._announce(self._pmus.ready_ns(measured_ns, sources), items, kernel.FRAME_ORDER)
         self._sent += int(self._flows_of[sources].sum())
 
     def run_until(self, until_ns: int) -> Outcome:
@@ -115,8 +112,7 @@ class PacketEngine:
             self._change()
         self._run_to(until_ns)
         self._now_ns = until_ns
-        outcome = self._endings.outcome(np.concatenate(self._rows), until_ns)
-        self._rows.clear()
+        outcome = self._endings.outcome(until_ns)
         self.counts().check(until_ns)
         return outcome
 
@@ -187,8 +183,7 @@ class PacketEngine:
 
     def streams(self) -> list[StreamUse]:
         """Return every random stream, with the numbers used up to the last `run_until`."""
-        pmus = [pmu.use() for pmu in self._pmus]
-        return [use for use in pmus if use] + self._supplies.uses(self._memory.table("streams"))
+        return self._pmus.uses() + self._supplies.uses(self._memory.table("streams"))
 
     def close(self) -> None:
         """Do nothing: there is nothing to let go of."""
@@ -229,15 +224,14 @@ class PacketEngine:
         if layout.first_tree == len(self._memory.table("flows")):
             return layout.capacity - int(self._memory.control[FREE_PACKETS])
         packets = self._memory.table("packets")[self._memory.inside()]
-        hops = self._memory.table("hops")[packets[:, HOP]]
-        members = hops[:, END_MEMBERS] - hops[:, FIRST_MEMBER]
+        plans = self._memory.plans_of(packets[:, HOP])
+        members = plans[:, END_MEMBERS] - plans[:, FIRST_MEMBER]
         return int(np.where(packets[:, FLOW] < layout.first_tree, 1, members).sum())
 
     def _frames_waiting(self) -> int:
         """Return the frames that are still at their PMU, or on a connection."""
-        items = self._memory.events()[:, ITEM]
-        codes = items[items % KINDS == FRAME] // KINDS
-        waiting = int(self._flows_of[codes % len(self._pmus)].sum()) if len(codes) else 0
+        memory = self._memory
+        waiting = frames_announced(self._flows_of, memory.cells, memory.layout)
         connections = self._memory.table("connections")
         connections = connections[connections[:, tcp.FRAMES_OF] != NONE]
         under_way = connections[:, tcp.AVAILABLE] - connections[:, tcp.EXPECTED]
@@ -259,7 +253,7 @@ class PacketEngine:
 
     def _collect(self) -> None:
         control = self._memory.control
-        self._rows.append(self._memory.table("ended")[: control[ENDED]].copy())
+        self._endings.take(self._memory.table("ended")[: control[ENDED]])
         control[ENDED] = 0
         self._taps.collect()
 

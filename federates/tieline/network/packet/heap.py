@@ -25,21 +25,26 @@ def push(cells: Cells, heap: int, size: int, time_ns: int, order: int, item: int
 @compiled
 def replace_first(cells: Cells, heap: int, size: int, time_ns: int, order: int, item: int) -> None:
     """Put an event in the place of the first and restore the order: a pop and a push in one."""
-    place = 0
-    child = 1
-    while child < size:
-        row = heap + HEAP_COLUMNS * child
-        if child + 1 < size and _precedes(
-            cells, cells[row + HEAP_COLUMNS], cells[row + HEAP_COLUMNS + ORDER], row
-        ):
-            child += 1
-            row += HEAP_COLUMNS
-        if _precedes(cells, time_ns, order, row):
-            break
-        _move(cells, row, heap + HEAP_COLUMNS * place)
-        place = child
+    place, row = 0, heap
+    child, below = 1, heap + HEAP_COLUMNS
+    while child + 1 < size:
+        # As a number, not as a branch: which child comes first is a matter of chance.
+        is_second = 1 * _precedes(
+            cells, cells[below + HEAP_COLUMNS], cells[below + HEAP_COLUMNS + ORDER], below
+        )
+        child += is_second
+        below += HEAP_COLUMNS * is_second
+        if _precedes(cells, time_ns, order, below):
+            _write(cells, row, time_ns, order, item)
+            return
+        _move(cells, below, row)
+        place, row = child, below
         child = 2 * place + 1
-    _write(cells, heap + HEAP_COLUMNS * place, time_ns, order, item)
+        below = heap + HEAP_COLUMNS * child
+    if child < size and not _precedes(cells, time_ns, order, below):
+        _move(cells, below, row)
+        row = below
+    _write(cells, row, time_ns, order, item)
 
 
 @compiled
@@ -55,7 +60,7 @@ def pop(cells: Cells, heap: int, size: int) -> None:
 @inlined
 def _precedes(cells: Cells, time_ns: int, order: int, row: int) -> bool:
     other_ns = cells[row + TIME]
-    return time_ns < other_ns or (time_ns == other_ns and order < cells[row + ORDER])
+    return (time_ns < other_ns) | ((time_ns == other_ns) & (order < cells[row + ORDER]))
 
 
 @inlined

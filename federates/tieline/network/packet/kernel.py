@@ -63,7 +63,7 @@ from tieline.network.packet.packets import (
     enter_datagram,
     record_end,
 )
-from tieline.network.packet.ports import HOP_COLUMNS, PORT_COLUMNS, WAITS, depart, transmit
+from tieline.network.packet.ports import PORT_COLUMNS, WAITS, depart, plan_of, transmit
 
 DONE, NEEDS_ROOM, NEEDS_DRAWS = 0, 1, 2
 
@@ -150,7 +150,7 @@ def _arrive(now: int, slot: int, cells: Cells, at: Layout) -> None:
     """A packet reaches the end of a link, as the first event of the heap."""
     packet = at.packets + _PACKET * slot
     hop = cells[packet + HOP] + 1
-    port = cells[at.hops + HOP_COLUMNS * hop + HOP_PORT]
+    port = cells[plan_of(hop, cells, at) + HOP_PORT]
     if cells[packet + LOST] != 0:
         _lose(now, slot, cells, at)
     elif port >= 0:
@@ -180,7 +180,7 @@ def _lose(now: int, slot: int, cells: Cells, at: Layout) -> None:
     """A packet that its link has lost would reach the end."""
     packet = at.packets + _PACKET * slot
     hop = cells[packet + HOP]
-    port = cells[at.hops + HOP_COLUMNS * hop + HOP_PORT]
+    port = cells[plan_of(hop, cells, at) + HOP_PORT]
     cells[at.ports + PORT_COLUMNS * port + LOSS_DROPS] += 1
     _leave(slot, cells, at)
     dropped(now, cells[packet + FLOW], cells[packet + SEQUENCE], hop, LOSS, cells, at)

@@ -114,7 +114,7 @@ def _queue(row: list[int], now: int, memory: Memory) -> tuple[int, int, bool]:
 
 def hop_of(now: int, row: int, ip_bytes: int, port: Port, memory: Memory, spec: NetworkSpec) -> Hop:
     """Return a packet at the link of a row of `hops`, as it comes there."""
-    plan = memory.table("hops")[row]
+    plan = memory.plans_of(row)
     origin, target = ends_of(int(plan[HOP_PORT]), spec)
     size = int(plan[HOP_BYTES])
     if plan[HOP_SERVICE] == NONE:
@@ -183,7 +183,7 @@ def note_refused(hop: Hop, row: int, port: Port, memory: Memory, supplies: Suppl
 def _why_full(hop: Hop, row: int, port: Port, memory: Memory) -> str | None:
     """Return in words why a queue has no room for a packet; None if it has."""
     if port.row[SPECIAL] & HAS_SERVER:
-        place = port.row[FIRST_CLASS] + int(memory.table("hops")[row, HOP_CLASS])
+        place = port.row[FIRST_CLASS] + int(memory.plans_of(row)[HOP_CLASS])
         line = memory.table("classes")[place]
         if line[COUNT] >= line[CLASS_PACKETS]:
             return f"its class held {line[COUNT]} packets, the most it takes"

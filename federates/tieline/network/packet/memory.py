@@ -56,9 +56,12 @@ HEAD, TAIL, COUNT, HELD_BYTES, DEFICIT = range(3, 8)
 # red: thresholds (2^20 = one packet), probability (2^30 = 1), weight as a power of two, its state.
 RED_LOW, RED_HIGH, RED_PROBABILITY, RED_SHIFT, RED_STREAM, RED_AVERAGE, RED_COUNT = range(7)
 
-# hops: one for each link of each route; after the last link comes a row with NO_PORT, or, where a
-# tree branches, one with FORK and the range of `forks`. Serialisation time is NONE where packets of
-# a flow differ in size. MEMBERS are the flows that a tree's packet on this hop still serves.
+# hops: the plan of each link of each route, in the order of the route; after the last link comes a
+# plan with NO_PORT, or, where a tree branches, one with FORK and the range of `forks`.
+
+# plans: what a hop is like; flows whose packets are alike share it, so that the plans that matter
+# stay near the processor. Serialisation time is NONE where packets of a flow differ in size.
+# MEMBERS are the flows that a tree's packet on this hop still serves.
 HOP_PORT, HOP_SERVICE, HOP_BYTES, HOP_CLASS, FIRST_MEMBER, END_MEMBERS = range(6)
 FIRST_FORK, END_FORKS = HOP_SERVICE, HOP_BYTES
 
@@ -102,7 +105,8 @@ COLUMNS = {
     "ports": 32,
     "classes": 8,
     "red": 7,
-    "hops": 8,
+    "hops": 1,
+    "plans": 8,
     "forks": 1,
     "members": 1,
     "flows": 5,
@@ -139,6 +143,7 @@ class Layout(NamedTuple):
     classes: int
     red: int
     hops: int
+    plans: int
     forks: int
     members: int
     flows: int
@@ -184,14 +189,16 @@ class Memory:
 
     def table(self, name: str) -> Cells:
         """Return a table as a view (rows, columns)."""
-        start: int = getattr(self.layout, name)
-        rows, columns = self._rows[name], COLUMNS[name]
-        return self.cells[start : start + rows * columns].reshape(rows, columns)
+        return self._tables[name]
 
     @property
     def control(self) -> Cells:
         """The control row as a view."""
         return self.table("control")[0]
+
+    def plans_of(self, hops: Cells | int) -> Cells:
+        """Return the rows of `plans` (n, columns) of some hops (n,), or the row of one."""
+        return self.table("plans")[self.table("hops")[hops, 0]]
 
     def inside(self) -> Cells:
         """Return the slots of the packets inside the network, ascending."""
@@ -245,3 +252,7 @@ class Memory:
         aligned = -(whole.ctypes.data // whole.itemsize) % LINE
         self.cells = whole[aligned : aligned + size]
         self.layout = Layout(**starts, capacity=self._rows["heap"], **self._bounds)
+        self._tables = {
+            name: self.cells[start : start + self._rows[name] * columns].reshape(-1, columns)
+            for (name, columns), start in zip(COLUMNS.items(), starts.values(), strict=True)
+        }

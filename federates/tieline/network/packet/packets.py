@@ -37,8 +37,8 @@ from tieline.network.packet.memory import (
 from tieline.network.packet.ports import (
     DROPPED_AT_CUT,
     DROPPED_AT_QUEUE,
-    HOP_COLUMNS,
     WAITS,
+    plan_of,
     transmit,
 )
 
@@ -76,7 +76,7 @@ def copy_to_forks(
     now: int, flow: int, sequence: int, row: int, size: int, cells: Cells, at: Layout
 ) -> None:
     """A tree's packet goes on along each of the hops at a fork, or ends there for a member."""
-    plan = at.hops + HOP_COLUMNS * row
+    plan = plan_of(row, cells, at)
     for fork in range(cells[plan + FIRST_FORK], cells[plan + END_FORKS]):
         target = cells[at.forks + fork]
         if target >= 0:
@@ -95,7 +95,7 @@ def dropped(
     elif flow < at.first_tree:
         cells[at.cross + _CROSS * (flow - at.pmu_flows) + ARRIVED + how] += 1
     else:
-        plan = at.hops + HOP_COLUMNS * hop
+        plan = plan_of(hop, cells, at)
         for member in range(cells[plan + FIRST_MEMBER], cells[plan + END_MEMBERS]):
             record_end(now, cells[at.members + member], sequence, how, cells, at)
 
@@ -128,7 +128,7 @@ def _start(
     now: int, flow: int, sequence: int, part: int, hop: int, size: int, cells: Cells, at: Layout
 ) -> None:
     """A packet of `size` IP bytes begins its route."""
-    port = cells[at.hops + HOP_COLUMNS * hop + HOP_PORT]
+    port = cells[plan_of(hop, cells, at) + HOP_PORT]
     if port >= 0:
         _put_on_link(now, flow, sequence, part, hop, size, cells, at)
     elif port == NO_PORT:

@@ -84,9 +84,15 @@ from tieline.network.packet.red import is_dropped_early
 DROPPED_AT_QUEUE, DROPPED_AT_CUT, WAITS = -1, -2, -3
 """In place of the instant at which a packet reaches the end of a link."""
 
-PORT_COLUMNS, HOP_COLUMNS = COLUMNS["ports"], COLUMNS["hops"]
+PORT_COLUMNS, _PLAN = COLUMNS["ports"], COLUMNS["plans"]
 _CLASS, _PACKET, _TAP, _RING = (COLUMNS[name] for name in ("classes", "packets", "taps", "ring"))
 _NS_PER_S = 1_000_000_000
+
+
+@inlined
+def plan_of(hop: int, cells: Cells, at: Layout) -> int:
+    """Return where the plan of a hop begins."""
+    return at.plans + _PLAN * cells[at.hops + hop]
 
 
 @compiled
@@ -95,7 +101,7 @@ def transmit(now: int, slot: int, hop: int, cells: Cells, at: Layout) -> int:
 
     Whether the link loses it is decided here and takes effect at the end of the link.
     """
-    plan = at.hops + HOP_COLUMNS * hop
+    plan = plan_of(hop, cells, at)
     port = at.ports + PORT_COLUMNS * cells[plan + HOP_PORT]
     cells[at.packets + _PACKET * slot + HOP] = hop
     if cells[port + SPECIAL] != 0:
@@ -134,7 +140,7 @@ def depart(now: int, number: int, cells: Cells, at: Layout) -> None:
 def link_bytes(slot: int, cells: Cells, at: Layout) -> int:
     """Return the bytes that a packet has on the link of its hop."""
     packet = at.packets + _PACKET * slot
-    plan = at.hops + HOP_COLUMNS * cells[packet + HOP]
+    plan = plan_of(cells[packet + HOP], cells, at)
     if cells[plan + HOP_SERVICE] != NONE:
         return cells[plan + HOP_BYTES]
     port = at.ports + PORT_COLUMNS * cells[plan + HOP_PORT]
@@ -214,7 +220,7 @@ def _wait(start_ns: int, size: int, port: int, cells: Cells, at: Layout) -> None
 
 @compiled
 def _transmit_special(now: int, slot: int, hop: int, cells: Cells, at: Layout) -> int:
-    plan = at.hops + HOP_COLUMNS * hop
+    plan = plan_of(hop, cells, at)
     port = at.ports + PORT_COLUMNS * cells[plan + HOP_PORT]
     special = cells[port + SPECIAL]
     if special & IS_DOWN != 0:
@@ -262,7 +268,7 @@ def _reach(
         arrival_ns += take(cells[port + JITTER_STREAM], cells, at)
     if special & HAS_TAP != 0:
         hop = cells[packet + HOP]
-        number = cells[at.hops + HOP_COLUMNS * hop + HOP_PORT]
+        number = cells[plan_of(hop, cells, at) + HOP_PORT]
         record = at.taps + _TAP * cells[at.control + TAPPED]
         cells[record + TAP_TIME] = start_ns
         cells[record + TAP_PORT] = number
@@ -300,7 +306,7 @@ def _passes(amount: int, left: int, stream: int, cells: Cells, at: Layout) -> in
 @inlined
 def _transmit_served(now: int, slot: int, hop: int, cells: Cells, at: Layout) -> int:
     """A packet comes to a port with a server."""
-    plan = at.hops + HOP_COLUMNS * hop
+    plan = plan_of(hop, cells, at)
     port = at.ports + PORT_COLUMNS * cells[plan + HOP_PORT]
     peer = cells[port + PEER]
     is_busy = cells[port + IS_SERVING] != 0 or (
@@ -334,7 +340,7 @@ def _transmit_served(now: int, slot: int, hop: int, cells: Cells, at: Layout) ->
 def _serve(now: int, slot: int, port: int, cells: Cells, at: Layout) -> int:
     """A port with a server starts to transmit a packet; returns when that reaches the end."""
     hop = cells[at.packets + _PACKET * slot + HOP]
-    plan = at.hops + HOP_COLUMNS * hop
+    plan = plan_of(hop, cells, at)
     size = link_bytes(slot, cells, at)
     service_ns = cells[plan + HOP_SERVICE]
     if service_ns == NONE:

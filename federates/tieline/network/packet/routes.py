@@ -47,7 +47,7 @@ class Load(NamedTuple):
 
 
 class Routes:
-    """The tables `hops`, `forks`, `members`, `flows` and `sources`, row by row.
+    """The tables `hops`, `plans`, `forks`, `members`, `flows` and `sources`, row by row.
 
     Attributes:
         first_tree: the first flow that is a tree.
@@ -73,7 +73,8 @@ class Routes:
                     f"(got {link.mtu_bytes})"
                 )
         self._spec = spec
-        self.hops: list[tuple[int, ...]] = []
+        self.hops: list[int] = []
+        self.plans: list[tuple[int, ...]] = []
         self.forks: list[int] = []
         self.members: list[int] = []
         self.flows: list[tuple[int, ...]] = []
@@ -83,6 +84,7 @@ class Routes:
         self.places: list[int] = []
         self.carried: list[tuple[int, bool]] = []
         self._loads: list[Load] = []
+        self._plan_of: dict[tuple[int, ...], int] = {}
         self._frames = Load(FRAME_BYTES + UDP_HEADER, spec.dscp)
         self._ways = {number: flow.route for number, flow in enumerate(spec.flows)}
         self._add_pmu_flows()
@@ -168,12 +170,18 @@ class Routes:
             self.most_pieces = max(self.most_pieces, -(-load.datagram // piece))
         first = len(self.hops)
         for pair in pairwise(route):
-            self.hops.append(self._hop(pair, load, is_sized=load.is_sized or piece != NONE))
-        self.hops.append((NO_PORT, 0, 0, 0, 0, 0))
+            self._add_hop(self._plan(pair, load, is_sized=load.is_sized or piece != NONE))
+        self._add_hop((NO_PORT, 0, 0, 0, 0, 0))
         self.places += range(len(route))
         return first, piece
 
-    def _hop(
+    def _add_hop(self, plan: tuple[int, ...]) -> None:
+        number = self._plan_of.setdefault(plan, len(self.plans))
+        if number == len(self.plans):
+            self.plans.append(plan)
+        self.hops.append(number)
+
+    def _plan(
         self,
         pair: tuple[str, str],
         load: Load,
@@ -181,7 +189,7 @@ class Routes:
         end: int = 0,
         is_sized: bool = False,
     ) -> tuple[int, ...]:
-        """Return the row of a hop; `first` and `end` are the members of a tree's."""
+        """Return the plan of a hop; `first` and `end` are the members of a tree's."""
         port = self._spec.ports[pair]
         link = self._spec.links[port // 2]
         line = link.queue.line_of(load.dscp)
@@ -225,13 +233,13 @@ class Routes:
             while not ends and len(branches) == 1:
                 route = ordered[low][0]
                 pair = (route[depth], route[depth + 1])
-                self.hops.append(self._hop(pair, self._frames, base + low, base + high))
+                self._add_hop(self._plan(pair, self._frames, base + low, base + high))
                 self.places.append(depth)
                 depth += 1
                 ends, branches = _at_node(ordered, low, high, depth)
             first = len(self.forks)
             self.forks += [-1 - flow for flow in ends] + [NONE] * len(branches)
-            self.hops.append((FORK, first, len(self.forks), 0, 0, 0))
+            self._add_hop((FORK, first, len(self.forks), 0, 0, 0))
             self.places.append(depth)
             for place, (branch_low, branch_high) in enumerate(branches):
                 pending.append((branch_low, branch_high, depth, first + len(ends) + place))

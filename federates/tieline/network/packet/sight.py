@@ -45,17 +45,17 @@ class Sight:
 
     def row(self, row: int) -> int | None:
         """Return the row of `hops` that the packet takes at one: its link, or its branch's."""
-        plan = self._memory.table("hops")[row]
+        plan = self._memory.plans_of(row)
         if plan[HOP_PORT] >= 0:
             return row
         if plan[HOP_PORT] == NO_PORT:
             return None
-        hops, members = self._memory.table("hops"), self._memory.table("members")
+        members = self._memory.table("members")
         for fork in range(int(plan[FIRST_FORK]), int(plan[END_FORKS])):
             target = int(self._memory.table("forks")[fork, 0])
             if target >= 0:
-                first, end = (int(hops[target, column]) for column in (FIRST_MEMBER, END_MEMBERS))
-                if self._flow in members[first:end, 0]:
+                branch = self._memory.plans_of(target)
+                if self._flow in members[branch[FIRST_MEMBER] : branch[END_MEMBERS], 0]:
                     return target
         return None
 

@@ -82,7 +82,7 @@ class Taps:
         records["hop"] = self._places[due[:, TAP_HOP]]
         flows = due[:, TAP_FLOW].copy()
         is_tree = flows >= self._first_tree
-        member = self._memory.table("hops")[due[is_tree, TAP_HOP], FIRST_MEMBER]
+        member = self._memory.plans_of(due[is_tree, TAP_HOP])[:, FIRST_MEMBER]
         flows[is_tree] = self._memory.table("members")[member, 0]
         records["flow"], records["is_back"] = self._carried[flows].T
         return records

@@ -123,9 +123,10 @@ class TracingEngine(PacketEngine):
         super().send(measured_ns, sources, sequence, payloads)
         if sequence == self._sequence and self._source in sources:
             self.fate.measured_ns = measured_ns
-            pmu = self._pmus[self._source]
-            if pmu.use() is not None:
-                self.fate.pmu_jitter = Draw(pmu.stream, pmu.drawn, float(pmu.last_draw_ns))
+            drawn = self._pmus.last_draw(self._source)
+            if drawn is not None:
+                stream, number, draw_ns = drawn
+                self.fate.pmu_jitter = Draw(stream, number, float(draw_ns))
             self._memory.table("ports")[:, SPECIAL] |= HAS_TAP
             self._is_watching = True
 
@@ -238,7 +239,7 @@ class TracingEngine(PacketEngine):
 
     def _ahead(self, hop: Hop, now: int, row: int) -> None:
         """Count what the same event has put before a segment."""
-        port = int(self._memory.table("hops")[row, HOP_PORT])
+        port = int(self._memory.plans_of(row)[HOP_PORT])
         for tap in self._sight.new_taps():
             if tap[TAP_FLOW] == self._sight.carrier and tap[TAP_SEQUENCE] == self._sight.segment:
                 return
@@ -318,7 +319,7 @@ class TracingEngine(PacketEngine):
         reaches_ns = self._sight.reaches_ns(copy.slot)
         if reaches_ns == copy.hop.reaches_ns:
             return
-        port = int(self._memory.table("hops")[copy.row, HOP_PORT])
+        port = int(self._memory.plans_of(copy.row)[HOP_PORT])
         rate_bps = int(self._memory.table("ports")[port, RATE])
         hop = copy.hop
         hop.reaches_ns = reaches_ns
@@ -360,7 +361,7 @@ class TracingEngine(PacketEngine):
         return int(self._memory.table("destinations")[self._destination, PROCESSING_STREAM])
 
     def _port(self, row: int, now: int) -> Port:
-        number = int(self._memory.table("hops")[row, HOP_PORT])
+        number = int(self._memory.plans_of(row)[HOP_PORT])
         return port_now(number, now, self._memory, self._supplies)
 
 
