@@ -19,6 +19,7 @@ from tieline.cosim.ports import reserved_port
 from tieline.cosim.runfile import federation_of
 from tieline.errors import CosimError, TielineError
 from tieline.experiment.guests import GuestProcess, guest_processes
+from tieline.experiment.keys import keyed, new_key
 from tieline.experiment.remote import Remote
 from tieline.experiment.supervise import Child, ProcessUse, Start, end_all, executed
 from tieline.experiment.watch import Progress, Suspect, Watch
@@ -114,7 +115,8 @@ def launch(
             broker = [*table[BROKER], settings.core, str(port), members]
             starts = [(BROKER, broker), *((name, [*table[name], str(run_file)]) for name in order)]
         guests = guest_processes(run, folder)
-        processes = Processes(folder, Watch(settings), on_progress, guests, start=start)
+        watch, key = Watch(settings), new_key()
+        processes = Processes(folder, watch, on_progress, guests, start=start, key=key)
         return processes.run(starts, stagger_s)
 
 
@@ -130,6 +132,7 @@ class Processes:
         on_fault: told who is at fault, or that the user is, before everything is ended.
         on_word: given every word as it came.
         start: how a federate or the broker comes to be.
+        key: HELICS's, without which nobody joins; None asks for none.
     """
 
     def __init__(
@@ -143,6 +146,7 @@ class Processes:
         on_fault: Callable[[Suspect], None] | None = None,
         on_word: Callable[[Mapping[str, Any]], None] | None = None,
         start: Start = executed,
+        key: str | None = None,
     ) -> None:
         self._folder = folder
         self._on_progress = on_progress
@@ -151,6 +155,7 @@ class Processes:
         self._on_fault = on_fault
         self._on_word = on_word
         self._start_process = start
+        self._key = key
         self._children: dict[str, Child | Remote] = {remote.name: remote for remote in remotes}
         self._marks: dict[str, float] = {}
 
@@ -179,7 +184,7 @@ class Processes:
     ) -> None:
         log = self._folder / "logs" / f"{name}.log"
         try:
-            self._children[name] = Child(name, command, log, start, has_word)
+            self._children[name] = Child(name, command, log, keyed(start, self._key), has_word)
         except OSError as error:
             self._fail(Suspect(name, f"could not be started: {error}", CosimError.exit_code))
 
