@@ -7,7 +7,7 @@ PYTHON ?= $(shell for name in python3 python3.13 python3.12 python3.11; do \
 	$$name -c '$(IS_SUPPORTED)' 2>/dev/null && echo $$name && break; done)
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
-.PHONY: help demo test smoke lint format docs wheel lock image clean
+.PHONY: help demo test smoke lint format docs peers performance wheel lock image clean
 
 help:
 	@echo "make demo    run the trip of G26 under six delays, with a table and plots"
@@ -16,6 +16,7 @@ help:
 	@echo "make lint    check style and types"
 	@echo "make format  bring every file into the house's format"
 	@echo "make docs    build the documentation as a site into build/site"
+	@echo "make performance  run every benchmark beside its peers, and write docs/performance.md"
 	@echo "make wheel   build the wheel and the source distribution into dist/"
 	@echo "make lock    pin anew what the image installs (needs uv)"
 	@echo "make image   build the image tieline (needs docker)"
@@ -41,6 +42,22 @@ format: $(VENV)/development
 
 docs: $(VENV)/development
 	$(BIN)/mkdocs build --strict
+
+# Each peer has an environment of its own: what they ask for does not fit together.
+PEERS := build/peers
+
+peers: $(PEERS)/andes/installed $(PEERS)/dpsim/installed $(PEERS)/ns3/installed
+
+$(PEERS)/andes/installed: PEER := andes
+$(PEERS)/dpsim/installed: PEER := dpsim
+$(PEERS)/ns3/installed: PEER := --editable .[ns3]
+$(PEERS)/%/installed:
+	$(PYTHON) -m venv $(@D)
+	$(@D)/bin/python -m pip --disable-pip-version-check install --quiet $(PEER)
+	@touch $@
+
+performance: $(VENV)/development peers
+	$(BIN)/python benchmarks/measure.py --peers $(PEERS)
 
 wheel: $(VENV)/development
 	$(BIN)/python -m build

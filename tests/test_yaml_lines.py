@@ -98,7 +98,7 @@ def test_nested_aliases_cannot_exhaust_the_memory(tmp_path):
 
 def test_deep_nesting_is_refused(tmp_path):
     """Otherwise a file of brackets would end in a traceback."""
-    with pytest.raises(InputError, match="nested too deeply"):
+    with pytest.raises(InputError, match="nested more than 100 groups deep"):
         loaded(tmp_path, "[" * 2_000)
 
 

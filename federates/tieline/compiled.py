@@ -27,7 +27,9 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 # numba calls first-class functions experimental at each compilation that sees one.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
-UNCOMPILED = ("api", "cli", "compare", "doctor", "experiment", "fates", "paper", "report", "sweeps")
+UNCOMPILED = (
+    "api", "cli", "compare", "doctor", "experiment", "fates", "logs", "paper", "report", "sweeps",
+)  # fmt: skip
 """Parts of the package that hold no compiled code, and that none of it takes anything from."""
 
 CACHES_KEPT = 4

@@ -3,19 +3,29 @@
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 import typer
-from rich.console import Console
 
 from tieline.errors import TielineError
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 INTERRUPTED = 130
 UNEXPECTED = 1
 
 
+def console_of(quiet: bool = False, stderr: bool = False) -> "Console":
+    """Return where a command prints, nowhere if quiet; what it needs is imported only here."""
+    from rich.console import Console
+
+    return Console(quiet=quiet, stderr=stderr)
+
+
 def say(text: str) -> None:
     """Print text as it is."""
-    Console().print(text, markup=False, highlight=False, soft_wrap=True)
+    console_of().print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 @contextmanager
@@ -38,7 +48,7 @@ def reporting(debug: bool = False) -> Iterator[None]:
 
 
 def _complain(message: str, debug: bool) -> None:
-    console = Console(stderr=True)
+    console = console_of(stderr=True)
     if debug:
         console.print(traceback.format_exc(), markup=False, highlight=False, soft_wrap=True)
     console.print(message, markup=False, highlight=False, soft_wrap=True)

@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 STYLE: Any = {
@@ -41,12 +43,27 @@ def save(folder: Path, figures: Mapping[str, Figure]) -> list[Path]:
     """Write figures as PNG and SVG into a folder, made if missing, and return the PNG files.
 
     An SVG has letters as text, so that a paper's own typeface can replace them, and no date, so
-    that the same figure is the same file.
+    that the same figure is the same file. Both have the layout of the PNG.
     """
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
     for name, figure in figures.items():
         paths.append(folder / f"{name}.png")
-        figure.savefig(paths[-1])
-        figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
+        pixels = _laid_out(figure)
+        pixels.print_png(paths[-1])
+        FigureCanvasSVG(figure).print_svg(folder / f"{name}.svg", metadata={"Date": None})
     return paths
+
+
+def _laid_out(figure: Figure) -> FigureCanvasAgg:
+    """Return a figure's pixels to be, its layout found once and for all.
+
+    `savefig` would find it anew for each file, and draw once for nothing.
+    """
+    figure.set_dpi(mpl.rcParams["savefig.dpi"])
+    canvas = FigureCanvasAgg(figure)
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine("none")
+    return canvas

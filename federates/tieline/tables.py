@@ -5,17 +5,26 @@ batch; `salvage` turns it into Parquet. Parquet itself keeps its index at the en
 unfinished Parquet file could not be read at all.
 """
 
+import errno
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import ArrayLike, NDArray
 
+from tieline.errors import CosimError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
 _STREAM_SUFFIX = ".arrows"
+_SUFFIXES = (".parquet", _STREAM_SUFFIX)
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _VALUES_PER_BATCH = 131_072
 _MOST_ROWS_PER_BATCH = 32_768
 _VALUES_PER_ROW_GROUP = 250_000
@@ -39,6 +48,7 @@ class TableStream:
 
     Rows are gathered to batches of about a megabyte, and each batch reaches the operating system
     before `append` returns: one batch is the memory held, and the most that a killed process loses.
+    Once a batch could not be written the table takes no more, and what was written stays readable.
 
     Args:
         path: the Parquet file to make; the stream stands beside it with the suffix `.arrows`.
@@ -76,6 +86,7 @@ class TableStream:
 
         Raises:
             ValueError: a column is missing or unknown, the lengths differ, or the table is closed.
+            CosimError: the disk is full, or fails.
             TypeError: an array's type cannot be stored in its column without losing its kind.
         """
         if not self._is_open:
@@ -103,13 +114,23 @@ class TableStream:
             return
         self.flush()
         self._is_open = False
-        self._writer.close()
-        self._sink.close()
-        _to_parquet(self._stream_path, self.path)
+        try:
+            self._writer.close()
+            self._sink.close()
+            _to_parquet(self._stream_path, self.path)
+        except OSError as error:
+            raise _unwritten(self.path, error) from error
 
     def _write_batch(self) -> None:
         arrays = {name: buffer[: self._filled] for name, buffer in self._buffers.items()}
-        self._writer.write_batch(_batch(self._schema, arrays))
+        whole_bytes = self._sink.tell()
+        try:
+            self._writer.write_batch(_batch(self._schema, arrays))
+        except OSError as error:
+            self._is_open = False
+            # What follows half a batch could not be read.
+            os.truncate(self._stream_path, whole_bytes)
+            raise _unwritten(self.path, error) from error
         self._filled = 0
 
 
@@ -117,14 +138,51 @@ def salvage(folder: Path) -> list[Path]:
     """Turn every stream left in `folder` by a killed process into Parquet, and return those files.
 
     The whole batches before a truncated end are kept. A stream cut before its schema was complete
-    holds nothing and is removed.
+    holds nothing and is removed. One that finds no room as Parquet stays; `stored` tells of it.
     """
     made = []
-    for stream_path in sorted(folder.glob(f"*{_STREAM_SUFFIX}")):
+    # The smallest first: where room is short, each one that is done makes some.
+    streams = sorted(folder.glob(f"*{_STREAM_SUFFIX}"), key=lambda path: path.stat().st_size)
+    for stream_path in streams:
         path = stream_path.with_suffix(".parquet")
-        if _to_parquet(stream_path, path):
-            made.append(path)
+        try:
+            if _to_parquet(stream_path, path):
+                made.append(path)
+        except OSError as error:
+            if error.errno not in _NO_ROOM:
+                raise
     return made
+
+
+def stored(path: Path) -> Path | None:
+    """Return where a table is: at `path`, in a stream that found no room there, or nowhere."""
+    stream_path = path.with_suffix(_STREAM_SUFFIX)
+    return next((each for each in (path, stream_path) if each.is_file()), None)
+
+
+def readable_tables(folder: Path) -> list[Path]:
+    """Return the files of the tables in a folder, one for each, by name."""
+    names = {path.stem for suffix in _SUFFIXES for path in folder.glob(f"*{suffix}")}
+    found = (stored(folder / f"{name}.parquet") for name in sorted(names))
+    return [path for path in found if path is not None]
+
+
+def read_whole(path: Path, columns: Sequence[str] | None = None) -> Any:
+    """Return a table, or some of its columns, as Arrow's; of a stream, its whole batches."""
+    if path.suffix != _STREAM_SUFFIX:
+        return pq.read_table(path, columns=None if columns is None else list(columns))
+    with pa.OSFile(str(path), "rb") as source:
+        reader = pa.ipc.open_stream(source)
+        table = pa.Table.from_batches(_whole_batches(reader), reader.schema)
+    return table if columns is None else table.select(list(columns))
+
+
+def last_value(path: Path, column: str) -> float | None:
+    """Return the last row's value of a column, None if there is no row or no such column."""
+    if column not in column_names(path):
+        return None
+    values = read_whole(path, [column]).column(column)
+    return None if len(values) == 0 else values[-1].as_py()
 
 
 def write_table(path: Path, columns: Sequence[Column], data: Mapping[str, ArrayLike]) -> None:
@@ -133,6 +191,7 @@ def write_table(path: Path, columns: Sequence[Column], data: Mapping[str, ArrayL
     Raises:
         ValueError: a column is missing or unknown, or the lengths differ.
         TypeError: values cannot be stored in their column without losing their kind.
+        CosimError: the disk is full, or fails.
     """
     schema = _schema_of(columns, None)
     arrays = {
@@ -145,31 +204,40 @@ def write_table(path: Path, columns: Sequence[Column], data: Mapping[str, ArrayL
     extra = {name: np.asarray(values) for name, values in data.items() if name not in arrays}
     _common_length(path, dict.fromkeys(schema.names), {**arrays, **extra})
     part = _part_of(path)
-    pq.write_table(pa.Table.from_batches([_batch(schema, arrays)]), part, compression="zstd")
-    part.replace(path)
+    try:
+        pq.write_table(pa.Table.from_batches([_batch(schema, arrays)]), part, compression="zstd")
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise _unwritten(path, error) from error
 
 
-def read_table(path: Path, columns: Sequence[str] | None = None) -> pd.DataFrame:
+def read_table(path: Path, columns: Sequence[str] | None = None) -> "pd.DataFrame":
     """Return a table, or some of its columns; nulls in a column of floats become NaN."""
+    # Federates write tables and read none: they should not wait for pandas.
+    import pandas as pd
+
+    if path.suffix == _STREAM_SUFFIX:
+        return read_whole(path, columns).to_pandas()
     return pd.read_parquet(path, columns=None if columns is None else list(columns))
 
 
 def column_names(path: Path) -> list[str]:
     """Return the names of a table's columns, in order, without reading the columns."""
-    return list(pq.read_schema(path).names)
+    return list(_schema_at(path).names)
 
 
 def units_of(path: Path) -> dict[str, tuple[str, str]]:
     """Return (unit, description) of each column of a table, by its name."""
     return {
         field.name: (field.metadata[b"unit"].decode(), field.metadata[b"description"].decode())
-        for field in pq.read_schema(path)
+        for field in _schema_at(path)
     }
 
 
 def metadata_of(path: Path) -> dict[str, str]:
     """Return the facts that a table's schema carries about the whole table."""
-    metadata = pq.read_schema(path).metadata or {}
+    metadata = _schema_at(path).metadata or {}
     return {key.decode(): value.decode() for key, value in metadata.items()}
 
 
@@ -198,8 +266,25 @@ def _arrow_type(dtype: str) -> pa.DataType:
 
 
 def _batch(schema: pa.Schema, arrays: Mapping[str, NDArray[np.generic]]) -> pa.RecordBatch:
-    columns = [pa.array(arrays[field.name], field.type, from_pandas=True) for field in schema]
+    columns = [_array(field.type, arrays[field.name]) for field in schema]
     return pa.RecordBatch.from_arrays(columns, schema=schema)
+
+
+def _array(kind: pa.DataType, values: NDArray[np.generic]) -> pa.Array:
+    """Return values as Arrow has them, NaN as null.
+
+    `pa.array` would do as much for an array, but imports pandas for it.
+    """
+    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
+        return pa.array(values.tolist(), kind, from_pandas=True)
+    data = np.ascontiguousarray(values, kind.to_pandas_dtype())
+    valid, nulls = None, 0
+    if pa.types.is_floating(kind):
+        is_missing = np.isnan(data)
+        nulls = int(is_missing.sum())
+        if nulls:
+            valid = pa.py_buffer(np.packbits(~is_missing, bitorder="little"))
+    return pa.Array.from_buffers(kind, len(data), [valid, pa.py_buffer(data)], nulls)
 
 
 def _common_length(
@@ -218,6 +303,18 @@ def _common_length(
     return int(first[0])
 
 
+def _schema_at(path: Path) -> pa.Schema:
+    if path.suffix != _STREAM_SUFFIX:
+        return pq.read_schema(path)
+    with pa.OSFile(str(path), "rb") as source:
+        return pa.ipc.open_stream(source).schema
+
+
+def _unwritten(path: Path, error: OSError) -> CosimError:
+    why = os.strerror(error.errno) if error.errno else str(error)
+    return CosimError(f"{path.name} cannot be written: {why}")
+
+
 def _part_of(path: Path) -> Path:
     return path.with_name(f".{path.name}.part")
 
@@ -231,11 +328,15 @@ def _to_parquet(stream_path: Path, path: Path) -> bool:
         if reader is not None:
             # A dictionary of numbers that never repeat costs memory for nothing.
             texts = [field.name for field in reader.schema if field.type == pa.string()]
-            with pq.ParquetWriter(
-                _part_of(path), reader.schema, compression="zstd", use_dictionary=texts
-            ) as writer:
-                for group in _row_groups(reader):
-                    writer.write_table(group)
+            try:
+                with pq.ParquetWriter(
+                    _part_of(path), reader.schema, compression="zstd", use_dictionary=texts
+                ) as writer:
+                    for group in _row_groups(reader):
+                        writer.write_table(group)
+            except OSError:
+                _part_of(path).unlink(missing_ok=True)
+                raise
     if reader is not None:
         _part_of(path).replace(path)
     stream_path.unlink()

@@ -51,7 +51,7 @@ class QuantityError(ValueError):
 
     def __init__(self, allowed: str, given: object) -> None:
         self.allowed = allowed
-        super().__init__(f"must be {allowed} (got {given!r})")
+        super().__init__(f"must be {allowed} (got {given!r:.80})")
 
 
 def quantity(value: object, dimension: str) -> float:

@@ -14,6 +14,13 @@ Position = tuple[Key, ...]
 MAX_VALUES = 200_000
 """Values that a document may hold with its aliases written out; a few nested aliases reach it."""
 
+MAX_DEPTH = 100
+"""Groups within groups that a document may hold. libyaml builds them by recursion without a limit
+of its own, and a file of brackets would overflow its stack and kill the process."""
+
+_MAX_BITS = 64
+"""Python refuses to print integers of some thousand digits, which hexadecimal ones can have."""
+
 _FAST = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 _PLAIN_TAGS = ("tag:yaml.org,2002:map", "tag:yaml.org,2002:seq")
@@ -52,8 +59,8 @@ def load(path: Path) -> Document:
 
     Raises:
         InputError: the file cannot be read or is no plain YAML: malformed, several documents, a
-            key twice, a merge key, an unknown tag, an alias within itself, or nested aliases that
-            write out to more than `MAX_VALUES` values.
+            key twice, a merge key, an unknown tag, an alias within itself, groups more than
+            `MAX_DEPTH` deep, or nested aliases that write out to more than `MAX_VALUES` values.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -70,16 +77,33 @@ def load(path: Path) -> Document:
         raise InputError(
             f"{path}:{line}: unacceptable character #x{int(error.character):04x}"
         ) from error
-    except RecursionError as error:
-        raise InputError(f"{path}: is nested too deeply") from error
 
 
 def _parsed(path: Path, text: str) -> Document:
+    _check_depth(path, text)
     try:
         return _read_with(_FAST, path, text)
     except (yaml.YAMLError, InputError):
         # The parser in C, ten times as fast, words its complaints in another way.
         return _read_with(yaml.SafeLoader, path, text)
+
+
+def _check_depth(path: Path, text: str) -> None:
+    """Refuse a text that is nested too deeply; whatever else is wrong with it is left to others."""
+    depth = 0
+    loader = _FAST(text)
+    try:
+        while loader.check_event():
+            event = loader.get_event()
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            if depth > MAX_DEPTH:
+                line = event.start_mark.line + 1
+                raise InputError(f"{path}:{line}: is nested more than {MAX_DEPTH} groups deep")
+    except yaml.YAMLError:
+        return
+    finally:
+        loader.dispose()
 
 
 def _read_with(kind: Any, path: Path, text: str) -> Document:
@@ -141,9 +165,14 @@ class _Reader:
 
     def scalar(self, node: yaml.ScalarNode) -> Any:
         try:
-            return self.loader.construct_object(node)
+            value = self.loader.construct_object(node)
         except ValueError as error:
-            raise self.refusal(node, f"'{node.value}' is malformed ({error})") from error
+            raise self.refusal(node, f"'{node.value:.60}' is malformed ({error})") from error
+        if isinstance(value, int) and value.bit_length() > _MAX_BITS:
+            raise self.refusal(
+                node, f"'{node.value:.60}' is a whole number beyond {_MAX_BITS} bits"
+            )
+        return value
 
     def refusal(self, node: yaml.Node, reason: str) -> InputError:
         return InputError(f"{self.path}:{node.start_mark.line + 1}: {reason}")

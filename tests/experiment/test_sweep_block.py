@@ -4,10 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from synthetic_result import EXPERIMENT
 from tieline.errors import InputError
-from tieline.experiment.axes import common, written
+from tieline.experiment.axes import Linspace, common, written
 from tieline.experiment.load import Study, load_experiment
 from tieline.experiment.sampling import MOST_POINTS
 from tieline.experiment.sweep import Point
@@ -229,3 +230,15 @@ def test_the_shipped_monte_carlo_study_draws_a_hundred_points() -> None:
     assert len({point.experiment.seed for point in found.points}) == 100
     keys = {".".join(map(str, own.path)) for point in found.points for own in point.overrides}
     assert keys >= {"network.mean_delay", "network.jitter.high", "network.loss"}
+
+
+@pytest.mark.parametrize(
+    ("ends", "count"), [("[59.98, 60.02]", 21), ("[1e6, 1000001]", 11), ("[0, 1]", 5000)]
+)
+def test_values_that_lie_close_together_stay_apart(ends: str, count: int) -> None:
+    """Points that are rounded onto each other would be run twice and look like a plateau."""
+    axis = Linspace(linspace=yaml.safe_load(ends), count=count)
+    assert len(set(axis.values())) == count
+    steps = np.diff(axis.values())
+    # Rounding moves each end of a step by at most half of a thousandth of the range, or of a step.
+    assert np.allclose(steps, np.mean(steps), rtol=0.6)

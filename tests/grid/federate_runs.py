@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from tieline.c37118.batch import encode_frames
+from tieline.c37118.batch import decode_frames, encode_frames, times_ns
 from tieline.cosim.interfaces import DELIVERY, DeliveryBundle
 from tieline.grid.case import Case
 from tieline.grid.federate import GridFederate, open_participant
 from tieline.resources import case_folder
 from tieline.tables import read_table
-from tieline.units import tick_ns
+from tieline.units import NS_PER_S, tick_ns
 
 RATE_HZ, STEPS, SENSORS, CONTROLLERS = 60, 240, 30, 34
 TRIP = {"at": 0.0, "trip_generator": "G26"}
@@ -49,12 +49,16 @@ def frames_of(f_hz: float, measured_ns: int) -> np.ndarray:
 
 
 def delivered(k: int, *arrivals: tuple[int, int, np.ndarray], until_ns: int | None = None) -> bytes:
-    """Return interval k's bundle: each (arrival_ns, controller, frames) brings all its frames."""
+    """Return interval k's bundle: each (arrival_ns, controller, frames) brings all its frames.
+
+    The number of a frame is that of the instant that its time tag says.
+    """
     rows, records = [np.zeros((0, 34), np.uint8)], []
     for arrival_ns, controller, frames in arrivals:
-        for source in range(len(frames)):
+        sequences = np.rint(times_ns(decode_frames(frames)[0]) * (RATE_HZ / NS_PER_S)).astype(int)
+        for source, sequence in enumerate(sequences):
             row = sum(map(len, rows)) + source
-            records.append((arrival_ns, source, controller, k, row))
+            records.append((arrival_ns, source, controller, sequence, row))
         rows.append(frames)
     table = np.array(sorted(records), DELIVERY)
     until = tick_ns(k + 1, RATE_HZ) if until_ns is None else until_ns

@@ -127,11 +127,13 @@ def test_deliveries_of_one_step_are_taken_in_their_order(miniwecc: Case, tmp_pat
     """The newest by time tag counts, also when both arrive between the same two steps."""
     grid = opened(miniwecc, tmp_path)
     grid.start()
-    early, late = (1_000_000, 0, frames_of(F_HZ, 1_000)), (1_000_001, 0, frames_of(59.0, 0))
-    grid.advance(0, delivered(0, early, late))
-    run_through(grid, 1)
+    run_through(grid, 0, 1)
+    t1_ns = tick_ns(1, RATE_HZ)
+    early, late = (t1_ns + 1, 0, frames_of(F_HZ, t1_ns)), (t1_ns + 2, 0, frames_of(59.0, 0))
+    grid.advance(1, delivered(1, early, late))
+    run_through(grid, 2)
     grid.finish()
-    assert column(tmp_path, "wbar_pu.G1")[1] == WBAR
+    assert column(tmp_path, "wbar_pu.G1")[2] == WBAR
 
 
 def test_a_late_frame_does_not_overwrite_a_newer_one(miniwecc: Case, tmp_path: Path) -> None:

@@ -150,6 +150,7 @@ def main() -> int:
         same = sum(made["tables"] == expected for made in own)
         say(f"| {core} | {len(own)} | {single} | {later} | {same} |")
     worst = max(differences, key=lambda table: differences[table])
+    most = differences[worst]
     say(f"\n{len(expected)} tables. Without the compiler, {SHORT_S} s: whole numbers equal,")
     say(f"largest difference of the others {most:.1e} ({worst}), allowed {TOLERANCE:.0e}.")
     is_equal = all(made["tables"] == expected for made in trials)

@@ -145,11 +145,14 @@ def decode_frames(payloads: NDArray[np.uint8]) -> tuple[NDArray[np.void], NDArra
         return np.zeros(n, FRAME), np.full(n, Verdict.SIZE, np.uint8)
     rows = np.ascontiguousarray(payloads)
     frames = rows.view(FRAME).reshape(n)
+    # A signalling NaN stays a NaN; NumPy warns of it.
+    with np.errstate(invalid="ignore"):
+        f_hz = frames["FREQ"].astype(np.float64)
     return frames, _judge(
         frames["SYNC"].astype(np.int64),
         frames["FRAMESIZE"].astype(np.int64),
         frames["STAT"].astype(np.int64),
-        frames["FREQ"].astype(np.float64),
+        f_hz,
         frames["CHK"].astype(np.int64) == crc_of_rows(rows[:, :-_CHK_BYTES]),
     )
 

@@ -158,7 +158,11 @@ def _take_phasor(words: WordReader, channel: PhasorChannel, form: FormatBit) -> 
     is_polar = FormatBit.POLAR in form
     if FormatBit.FLOAT_PHASORS in form:
         first, second = words.numbers("f", 2)
-        return cmath.rect(first, second) if is_polar else complex(first, second)
+        if not is_polar:
+            return complex(first, second)
+        # An infinite angle points nowhere: no measurement.
+        is_one = math.isfinite(first) and math.isfinite(second)
+        return cmath.rect(first, second) if is_one else complex(math.nan, math.nan)
     if not is_polar:
         real, imaginary = (_number(word) for word in words.integers("h", 2))
         return complex(real * channel.units_per_bit, imaginary * channel.units_per_bit)

@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from tieline.cli.options import AsJson, Debug
-from tieline.console import reporting, say
+from tieline.console import console_of, reporting, say
 
 Results = Annotated[
     list[str],
@@ -32,7 +31,7 @@ def compare(
     with reporting(debug):
         from tieline.compare.commands import compare as compare_runs
 
-        comparison = compare_runs(results, unit, out, Console(quiet=as_json))
+        comparison = compare_runs(results, unit, out, console_of(quiet=as_json))
         if as_json:
             typer.echo(json.dumps(comparison, indent=2, ensure_ascii=False))
 

@@ -4,11 +4,9 @@ import dataclasses
 import json
 
 import typer
-from rich.console import Console
-from rich.text import Text
 
 from tieline.cli.options import AsJson, Debug
-from tieline.console import reporting
+from tieline.console import console_of, reporting
 from tieline.errors import TielineError
 
 COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
@@ -19,10 +17,12 @@ def doctor(as_json: AsJson = False, debug: Debug = False) -> None:
 
     The exit code is 0 unless a check fails.
     """
+    from rich.text import Text
+
     from tieline.doctor import CHECKS, examine
 
     with reporting(debug):
-        console = Console(quiet=as_json)
+        console = console_of(quiet=as_json)
         findings = []
         for finding in examine(CHECKS):
             findings.append(finding)

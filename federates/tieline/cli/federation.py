@@ -5,13 +5,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from tieline.cli.options import Debug, Reference, Settings
 from tieline.cli.run import planned
-from tieline.console import reporting, say
+from tieline.console import console_of, reporting, say
 from tieline.errors import InputError
-from tieline.units import ns_to_seconds, quantity
 
 if TYPE_CHECKING:
     from tieline.experiment.plan import PlannedRun
@@ -68,7 +66,7 @@ def gather(
     from tieline.experiment.report import report as write_report
 
     with reporting(debug):
-        write_report(gather_folders(folders, out), Console())
+        write_report(gather_folders(folders, out), console_of())
 
 
 def broker(
@@ -99,7 +97,7 @@ def broker(
                 f"on the other hosts, before tieline join: read -rs {KEY_VARIABLE};"
                 f" export {KEY_VARIABLE}"
             )
-        with shown_progress(plan.study.points, Console()) as listener:
+        with shown_progress(plan.study.points, console_of()) as listener:
             outcome = serve(run, host, port, _seconds(wait), say, _of_grid(run, listener), key)
         say(f"both federates reached the end, in {sum(outcome.wall_s.values()):.1f} s")
 
@@ -134,6 +132,8 @@ def join(
 
 
 def _of_grid(run: "PlannedRun", listener: "Listener") -> "Callable[[Progress], None]":
+    from tieline.units import ns_to_seconds
+
     def report(progress: "Progress") -> None:
         if progress.federate == "grid" and listener.on_time is not None:
             listener.on_time(run.point, ns_to_seconds(max(0, progress.granted_ns)))
@@ -142,6 +142,8 @@ def _of_grid(run: "PlannedRun", listener: "Listener") -> "Callable[[Progress], N
 
 
 def _seconds(text: str) -> float:
+    from tieline.units import quantity
+
     try:
         return quantity(text, "time")
     except ValueError as error:

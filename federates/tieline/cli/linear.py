@@ -4,10 +4,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from tieline.cli.options import AsJson, Case, Debug, Out
-from tieline.console import reporting
+from tieline.console import console_of, reporting
 from tieline.errors import InputError
 
 if TYPE_CHECKING:
@@ -43,7 +42,7 @@ def modes(
 
         study = _study(case, pss, gain, beta1, beta2, average)
         answer = modes_answer(study, delay, sweep, controls)
-        give(answer, out, f"results/modes-{Path(case).name}", as_json, Console())
+        give(answer, out, f"results/modes-{Path(case).name}", as_json, console_of())
 
 
 def freqresp(
@@ -68,7 +67,7 @@ def freqresp(
 
         study = _study(case, pss, 1.0, beta1, beta2, average, unit)
         answer = freqresp_answer(study, unit, delay or [0.0], gain, _band(band))
-        give(answer, out, f"results/freqresp-{Path(case).name}-{unit}", as_json, Console())
+        give(answer, out, f"results/freqresp-{Path(case).name}-{unit}", as_json, console_of())
 
 
 def damping(
@@ -85,7 +84,7 @@ def damping(
         from tieline.linear.commands import damping_answer, give
 
         answer = damping_answer(folder, unit or ())
-        give(answer, out, str(folder / "damping"), as_json, Console())
+        give(answer, out, str(folder / "damping"), as_json, console_of())
 
 
 def _study(

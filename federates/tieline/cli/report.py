@@ -4,10 +4,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from tieline.cli.options import Debug
-from tieline.console import reporting
+from tieline.console import console_of, reporting
 
 
 def report(
@@ -18,4 +17,4 @@ def report(
     from tieline.experiment.report import report as write_report
 
     with reporting(debug):
-        write_report(folder, Console())
+        write_report(folder, console_of())

@@ -4,10 +4,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from tieline.cli.options import Debug
-from tieline.console import reporting, say
+from tieline.console import console_of, reporting, say
 
 
 def reproduce(
@@ -34,4 +33,4 @@ def reproduce(
         if list_:
             say(list_of())
             return
-        give(only or (), out, quick, markdown, Console())
+        give(only or (), out, quick, markdown, console_of())

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from tieline.cli.options import (
     AsJson,
@@ -17,14 +16,13 @@ from tieline.cli.options import (
     Reference,
     Settings,
 )
-from tieline.console import reporting, say
+from tieline.console import console_of, reporting, say
 from tieline.errors import InputError
-from tieline.experiment.layers import read_layers
-from tieline.experiment.load import Study, load_experiment, shipped_experiments
-from tieline.resources import shipped
-from tieline.yaml_lines import load as load_yaml
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
+    from tieline.experiment.load import Study
     from tieline.experiment.plan import Plan
     from tieline.experiment.run import Launch
     from tieline.experiment.sweep_run import Runner
@@ -59,6 +57,7 @@ def run(
 
     A sweep runs its points at once, as `tieline sweep` does.
     """
+    from tieline.experiment.load import load_experiment
     from tieline.sweeps.start import with_core
 
     with reporting(debug):
@@ -96,10 +95,12 @@ def validate(reference: Reference, settings: Settings = None, debug: Debug = Fal
 
 def planned(reference: str, settings: list[str]) -> "Plan":
     """Return the checked plan of an experiment."""
+    from tieline.experiment.load import load_experiment
+
     return prepared(load_experiment(reference, settings))
 
 
-def prepared(study: Study) -> "Plan":
+def prepared(study: "Study") -> "Plan":
     """Return the plan of a study, checked against its case and network."""
     from tieline.experiment.plan import prepare
 
@@ -108,9 +109,9 @@ def prepared(study: Study) -> "Plan":
 
 def launcher() -> "Launch":
     """Return what starts the federates."""
-    from tieline.experiment.launch import launch
+    from tieline.sweeps.single import launch_here
 
-    return launch
+    return launch_here
 
 
 def sweep_runner(plan: "Plan", jobs: int | None, scheduler: str | None) -> "Runner":
@@ -122,6 +123,10 @@ def sweep_runner(plan: "Plan", jobs: int | None, scheduler: str | None) -> "Runn
 
 def shipped_things() -> dict[str, list[dict[str, object]]]:
     """Return the shipped experiments and cases, as `tieline list --json` prints them."""
+    from tieline.experiment.layers import read_layers, shipped_experiments
+    from tieline.resources import shipped
+    from tieline.yaml_lines import load as load_yaml
+
     experiments: list[dict[str, object]] = []
     for path in shipped_experiments():
         data = read_layers(path).data
@@ -147,7 +152,7 @@ def catalogue() -> str:
 
 
 def run_sweep_plan(
-    study: Study,
+    study: "Study",
     out: Path | None,
     jobs: int | None,
     scheduler: str | None,
@@ -162,7 +167,7 @@ def run_sweep_plan(
 
     if out is not None:
         check_target(out)
-    console = Console(quiet=quiet or as_json)
+    console = console_of(quiet=quiet or as_json)
     plan = prepared(study)
     runner = sweep_runner(plan, jobs, scheduler)
     target = out or default_target(study.name)
@@ -184,14 +189,14 @@ def run_sweep_plan(
     _show(target, console, quiet, as_json)
 
 
-def _run_single(study: Study, out: Path | None, quiet: bool, as_json: bool) -> None:
+def _run_single(study: "Study", out: Path | None, quiet: bool, as_json: bool) -> None:
     from tieline.experiment.progress import shown_progress
     from tieline.experiment.run import RunFailedError, check_target, default_target, execute
 
     if out is not None:
         check_target(out)
     plan = prepared(study)
-    console = Console(quiet=quiet or as_json)
+    console = console_of(quiet=quiet or as_json)
     console.print(study.question, markup=False, highlight=False, soft_wrap=True)
     try:
         with shown_progress(study.points, console) as listener:
@@ -203,7 +208,7 @@ def _run_single(study: Study, out: Path | None, quiet: bool, as_json: bool) -> N
     _show(folder, console, quiet, as_json)
 
 
-def _show(folder: Path, console: Console, quiet: bool, as_json: bool) -> None:
+def _show(folder: Path, console: "Console", quiet: bool, as_json: bool) -> None:
     """Write table and plots of a result, and show it as was asked for."""
     from tieline.experiment.report import report as write_report
     from tieline.experiment.results import read_runs
@@ -218,7 +223,7 @@ def _show(folder: Path, console: Console, quiet: bool, as_json: bool) -> None:
         typer.echo(folder)
 
 
-def _show_spread(folder: Path, console: Console) -> None:
+def _show_spread(folder: Path, console: "Console") -> None:
     """Show what many points are like together, and where each stands."""
     from tieline.experiment.points_table import spread
 

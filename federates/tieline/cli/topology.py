@@ -8,7 +8,6 @@ import typer
 
 from tieline.console import reporting, say
 from tieline.errors import InputError
-from tieline.experiment.overrides import shortest
 from tieline.resources import case_folder, shipped
 
 if TYPE_CHECKING:
@@ -164,6 +163,7 @@ def import_(
 def check(file: File, case: OfCase = None, debug: Debug = False) -> None:
     """Check a topology file, and show its size, delays and single points of failure."""
     with reporting(debug):
+        from tieline.experiment.overrides import shortest
         from tieline.network.topologies.summary import lines_of, summary_of
 
         path, folder = _located(file, case)
@@ -187,6 +187,7 @@ def draw(
 ) -> None:
     """Draw a topology: nodes, links by rate, PMUs, controllers and control centres."""
     with reporting(debug):
+        from tieline.experiment.overrides import shortest
         from tieline.network.topologies.picture import write_picture
 
         path, folder = _located(file, case)

@@ -1,8 +1,9 @@
 """Where guests are served: the network's participant hands them packets, the grid's obeys them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Protocol
 
+from tieline.cosim.border import check_stamps
 from tieline.cosim.guests import (
     MODULATION,
     PACKETS,
@@ -13,7 +14,8 @@ from tieline.cosim.guests import (
     unit_owners,
 )
 from tieline.cosim.interfaces import GRID, NETWORK, Clock, DeliveryBundle, Participant, lag_ns
-from tieline.errors import TimeContractBroken
+from tieline.cosim.strangers import Strangers
+from tieline.errors import FrameError, TimeContractBroken
 from tieline.units import ns_to_seconds
 
 
@@ -50,10 +52,12 @@ class _Desk:
         self.name = participant.name
         self._participant = participant
         self._port: Port
+        self._strangers: Strangers
 
-    def open(self, ports: Ports) -> None:
-        """Take the endpoint for guests from the federate's link."""
+    def open(self, ports: Ports, strangers: Strangers) -> None:
+        """Take the endpoint for guests from the federate's link, and who counts what is dropped."""
         self._port = ports.endpoint(self.endpoint_name)
+        self._strangers = strangers
 
     def start(self) -> list[bytes]:
         """Return the participant's first messages."""
@@ -73,20 +77,31 @@ class NetworkDesk(_Desk):
 
     Args:
         participant: the network.
+        clock: of the run; without a lead.
         endpoints: of guests, by the number of the controller whose packets they get.
     """
 
     endpoint_name = PACKETS
 
-    def __init__(self, participant: Participant, endpoints: Mapping[int, str]) -> None:
+    def __init__(
+        self, participant: Participant, clock: Clock, endpoints: Mapping[int, str]
+    ) -> None:
         super().__init__(participant)
+        self._clock = clock
         self._endpoints = endpoints
 
     def advance(self, k: int, received: bytes) -> bytes:
-        """Return the participant's bundle; its packets for guests are sent on their way."""
+        """Return the participant's bundle; its packets for guests are sent on their way.
+
+        Raises:
+            TimeContractBroken: a packet arrives outside the interval.
+        """
+        for source, _, data in self._port.receive():
+            self._strangers.drop(PACKETS, source, data, "nobody may send there")
         message = self._participant.advance(k, received)
         if message:
             bundle = DeliveryBundle.from_bytes(message)
+            check_stamps(NETWORK, self._clock, k, bundle.records["arrival_ns"])
             for record in bundle.records:
                 to = self._endpoints.get(int(record["destination"]))
                 if to is not None:
@@ -112,13 +127,18 @@ class GridDesk(_Desk):
         super().__init__(participant)
         self._grid = participant
         self._clock = clock
-        self._owners = owners
+        self._known = {endpoint_of(owner.name, unit) for unit, owner in owners.items()}
         self._granted_ns = -1
 
     def advance(self, k: int, received: bytes) -> bytes:
-        """Let the commands that came act from t_k on; return the participant's frames."""
+        """Let the commands that came act from t_k on; return the participant's frames.
+
+        Raises:
+            TimeContractBroken: as `_check`.
+            NumericalError: a guest's signal is not finite.
+        """
         before_ns, self._granted_ns = self._granted_ns, self._clock.at_ns(k) + self._lag_ns
-        commands = [read_command(*message) for message in self._port.receive()]
+        commands = list(self._commands())
         for command in commands:
             self._check(command, before_ns)
         if commands:
@@ -129,17 +149,24 @@ class GridDesk(_Desk):
     def _lag_ns(self) -> int:
         return lag_ns(GRID, self._clock)
 
+    def _commands(self) -> Iterator[Command]:
+        """Yield the signals of guests for their own units; all else is dropped and counted."""
+        for source, stamp_ns, data in self._port.receive():
+            if source not in self._known:
+                why = "it is no guest, or the unit is not among its own"
+                self._strangers.drop(MODULATION, source, data, why)
+                continue
+            try:
+                yield read_command(source, stamp_ns, data)
+            except FrameError as error:
+                self._strangers.drop(MODULATION, source, data, str(error))
+
     def _check(self, command: Command, before_ns: int) -> None:
-        """Refuse a command whose place among the grid's grants is left to chance, or not its own.
+        """Refuse a command whose place among the grid's grants is left to chance.
 
         Raises:
-            TimeContractBroken: it does.
+            TimeContractBroken: it is.
         """
-        owner = self._owners.get(command.unit)
-        if owner is None or owner.name != command.guest:
-            raise TimeContractBroken(
-                f"{command.guest} sent a signal for {command.unit}, which is not among its units"
-            )
         if not before_ns < command.stamp_ns < self._granted_ns:
             raise TimeContractBroken(
                 f"{command.guest} sent a signal for {command.unit} at "
@@ -161,5 +188,5 @@ def desk_of(participant: Any, run: Mapping[str, Any]) -> NetworkDesk | GridDesk 
     if participant.name == NETWORK:
         units = [site["unit"] for site in run["destinations"]]
         places = {units.index(unit): endpoint_of(owners[unit].name, unit) for unit in owners}
-        return NetworkDesk(participant, places)
+        return NetworkDesk(participant, Clock(**run["clock"]), places)
     return GridDesk(participant, Clock(**run["clock"]), owners)

@@ -3,7 +3,6 @@
 import os
 import sys
 import threading
-import traceback
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from tieline.cosim.desks import desk_of
 from tieline.cosim.exchange import SIDES, Exchange
 from tieline.cosim.guard import GuardedParticipant
 from tieline.cosim.interfaces import Clock, OpenParticipant
+from tieline.cosim.journal import keep_journal, log_failure
 from tieline.cosim.link import FederationEndedError, HelicsLink
 from tieline.cosim.process import (
     die_with_launcher,
@@ -23,6 +23,7 @@ from tieline.cosim.process import (
 )
 from tieline.cosim.runfile import federation_of, read_config, read_run
 from tieline.cosim.status import Fault, Heartbeat, Status
+from tieline.cosim.strangers import Strangers
 from tieline.cosim.word import leave_word
 from tieline.errors import CosimError
 
@@ -60,6 +61,7 @@ class Federate:
         self._participant: GuardedParticipant | None = None
         self._link: HelicsLink | None = None
         self._stop: tuple[str, Fault] | None = None
+        self._strangers = Strangers(name)
 
     def serve(self, open_participant: OpenParticipant) -> int:
         """Return the exit code of a whole run, 0 only when it reached its checked end."""
@@ -68,6 +70,7 @@ class Federate:
         except Exception as error:
             return self._fail(error)
         finally:
+            self._strangers.save(self._folder)
             self.is_done.set()
         return 0
 
@@ -100,12 +103,13 @@ class Federate:
         self._status.enter("joining")
         config = self._config or own_config(self.name, self._run, place, settings.start_timeout)
         with signals_held():
-            link = HelicsLink(self.name, config, member_count(self._run))
+            members = member_count(self._run)
+            link = HelicsLink(self.name, config, members, self._strangers)
             self._link = link
         if self._stop is not None:
             raise CosimError(self._stop[0])
         if desk is not None:
-            desk.open(link)
+            desk.open(link, self._strangers)
         link.start()
         self._status.enter("running")
         SIDES[self.name](participant, Exchange(self.name, link, clock, self._status), clock)
@@ -115,7 +119,7 @@ class Federate:
         self._status.enter("finished")
 
     def _fail(self, error: Exception) -> int:
-        traceback.print_exception(error)
+        log_failure(self.name, error)
         reason, fault = self._stop or _verdict(error)
         code = CosimError.exit_code if self._stop else exit_code_of(error)
         self._status.fail(reason, fault, code)
@@ -141,6 +145,7 @@ def main(name: str, open_participant: OpenParticipant) -> None:
     die_with_launcher()
     run, folder = read_run(sys.argv)
     status = Status(name, _STDOUT)
+    keep_journal(name, [status], _STDOUT)
     federate = Federate(name, run, folder, status, read_config(sys.argv))
     on_termination(lambda signal_name: _terminate(federate, signal_name))
     with Heartbeat([status]):

@@ -1,5 +1,6 @@
 """Federates that other people write: what an experiment says of them, and how they are told."""
 
+import math
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,8 +8,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat
 
-from tieline.errors import CosimError
-from tieline.units import NS_PER_S, Unit
+from tieline.errors import FrameError, NumericalError
+from tieline.units import Unit, ns_to_seconds
 
 MODULATION = "grid/modulation"
 """Endpoint of the grid that takes stabiliser signals."""
@@ -103,17 +104,22 @@ def read_command(source: str, stamp_ns: int, data: bytes) -> Command:
     """Return what a message to `MODULATION` says: its text is a number, its source the unit.
 
     Raises:
-        CosimError: the text is no finite number.
+        FrameError: the text is no number.
+        NumericalError: the number is not finite.
     """
     guest, _, unit = source.partition("/")
+    if len(data) > _LONGEST_SIGNAL_BYTES:
+        raise FrameError(f"a stabiliser signal has at most {_LONGEST_SIGNAL_BYTES} bytes")
     try:
-        v_s_pu = float(data[:_LONGEST_SIGNAL_BYTES].decode("ascii"))
+        v_s_pu = float(data.decode("ascii"))
     except (UnicodeDecodeError, ValueError):
-        v_s_pu = float("nan")
-    if not abs(v_s_pu) < float("inf"):
-        raise CosimError(
-            f"{source} sent {data[:_LONGEST_SIGNAL_BYTES]!r} at {stamp_ns / NS_PER_S:.9f} s; "
+        raise FrameError(
             "a stabiliser signal is a number as text, in pu, such as b'0.0125'"
+        ) from None
+    if not math.isfinite(v_s_pu):
+        raise NumericalError(
+            f"{guest} sent a stabiliser signal for {unit} that is not finite ({v_s_pu}) "
+            f"at t = {ns_to_seconds(stamp_ns):.9f} s"
         )
     return Command(guest, unit, stamp_ns, v_s_pu)
 

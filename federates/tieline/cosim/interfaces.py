@@ -50,10 +50,13 @@ class FederationSettings(BaseModel):
         30.0, gt=0, le=3600, description="longest wait for a federate to join"
     )
     hang_timeout: Seconds = Field(
-        8.0,
+        6.0,
         gt=0,
         le=3600,
-        description="longest wall time without a grant before a federate counts as hung",
+        description=(
+            "longest wall time without a grant before a federate counts as hung; a run whose"
+            " meetings take long, and in which somebody works, gets more by itself"
+        ),
     )
     guests: tuple[GuestSettings, ...] = Field(
         (), description="federates of other people's that take part"

@@ -15,6 +15,7 @@ import helics
 from tieline.cosim.conventions import BROKER_NAME, Place, broker_options
 from tieline.cosim.exchange import PEER
 from tieline.cosim.interfaces import ENDPOINTS
+from tieline.cosim.strangers import Strangers
 from tieline.cosim.wire import PART_LIMIT_BYTES
 from tieline.errors import CosimError
 from tieline.units import ns_to_seconds, seconds_to_ns
@@ -35,13 +36,18 @@ class HelicsLink:
         name: `grid` or `network`.
         config: the federate's HELICS configuration.
         members: how many federates the federation has.
+        strangers: counts the messages that come from anybody else than the peer.
 
     Raises:
         FederationEndedError: the broker does not answer or refuses.
     """
 
-    def __init__(self, name: str, config: Mapping[str, Any], members: int) -> None:
+    def __init__(
+        self, name: str, config: Mapping[str, Any], members: int, strangers: Strangers
+    ) -> None:
         self.limit_bytes = PART_LIMIT_BYTES.get(config["core_type"])
+        self._name = name
+        self._strangers = strangers
         self._peer = ENDPOINTS[PEER[name]]
         self._members = members
         try:
@@ -84,8 +90,19 @@ class HelicsLink:
         _send(self._endpoint, self._peer, data, at_ns)
 
     def receive(self) -> list[tuple[int, bytes]]:
-        """Return what has come since the last call, as (stamp in ns, message)."""
-        return [(stamp_ns, data) for _, stamp_ns, data in _received(self._endpoint)]
+        """Return what the peer has sent since the last call, as (stamp in ns, message).
+
+        What comes from another endpoint is dropped and counted: a federate of somebody else's may
+        send what it likes, but only the peer's word counts.
+        """
+        messages = []
+        for source, stamp_ns, data in _received(self._endpoint):
+            if source == self._peer:
+                messages.append((stamp_ns, data))
+            else:
+                why = f"only {self._peer} may send there"
+                self._strangers.drop(ENDPOINTS[self._name], source, data, why)
+        return messages
 
     def endpoint(self, name: str) -> "Endpoint":
         """Return another endpoint that the configuration has."""

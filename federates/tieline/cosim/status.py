@@ -12,6 +12,21 @@ Fault = Literal["own", "other"]
 
 _PERIOD_S = 0.25
 
+_SPEAKING = threading.Lock()
+"""Held for a line: the kernel keeps the lines of several threads apart up to 4 kB only."""
+
+
+def write_line(descriptor: int, line: bytes) -> int:
+    """Write one line and return the descriptor for the next; a reader that is gone ends nothing."""
+    with _SPEAKING:
+        data = memoryview(line + b"\n")
+        try:
+            while data:
+                data = data[os.write(descriptor, data) :]
+        except BrokenPipeError:
+            return os.open(os.devnull, os.O_WRONLY)
+    return descriptor
+
 
 class Status:
     """The state of one federate, written as JSON lines to a file descriptor.
@@ -30,6 +45,11 @@ class Status:
         self._granted_ns = -1
         self._waits = False
         self._failure: dict[str, str | int] = {}
+
+    @property
+    def granted_ns(self) -> int:
+        """The last grant, ns; -1 before the first."""
+        return self._granted_ns
 
     @property
     def wall_s(self) -> float:
@@ -69,11 +89,7 @@ class Status:
 
     def write(self) -> None:
         """Write one line; a reader that is gone is no reason to stop here."""
-        try:
-            # One write, so that lines of several threads never mix.
-            os.write(self._descriptor, json.dumps(self.line()).encode() + b"\n")
-        except BrokenPipeError:
-            self._descriptor = os.open(os.devnull, os.O_WRONLY)
+        self._descriptor = write_line(self._descriptor, json.dumps(self.line()).encode())
 
 
 class Heartbeat:

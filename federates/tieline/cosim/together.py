@@ -3,7 +3,6 @@
 import os
 import sys
 import threading
-import traceback
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
@@ -11,6 +10,7 @@ from typing import Any, Protocol
 from tieline.cosim.exchange import PEER
 from tieline.cosim.guard import GuardedParticipant
 from tieline.cosim.interfaces import FEDERATES, GRID, NETWORK, Clock, OpenParticipant
+from tieline.cosim.journal import keep_journal, log_failure
 from tieline.cosim.local import run_local
 from tieline.cosim.process import (
     die_with_launcher,
@@ -41,6 +41,7 @@ def main(participants: Mapping[str, OpenParticipant] | None = None) -> None:
     run, folder = read_run(sys.argv)
     openers = participants or _own_participants()
     statuses = {name: Status(name, _STDOUT) for name in FEDERATES}
+    keep_journal("together", tuple(statuses.values()), _STDOUT)
     both = _both(run, folder, statuses)
     on_termination(lambda name: _terminate(both, name))
     with Heartbeat(statuses.values()):
@@ -98,10 +99,10 @@ class _Local:
         self._enter_all("finished")
 
     def _fail(self, error: Exception) -> int:
-        traceback.print_exception(error)
+        culprit = self._culprit()
+        log_failure(culprit, error)
         reason = self._stop or reason_of(error)
         code = CosimError.exit_code if self._stop else exit_code_of(error)
-        culprit = self._culprit()
         self._statuses[culprit].fail(reason, "own", code)
         self._statuses[PEER[culprit]].fail(f"{culprit}: {reason}", "other", code)
         for participant in self._participants.values():

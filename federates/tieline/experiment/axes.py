@@ -21,7 +21,10 @@ from pydantic import (
 from tieline.units import QuantityError, Unit, converted, dimension_of, split
 
 DIGITS = 4
-"""Significant digits that a drawn or spaced value keeps, so that labels can be read."""
+"""Significant digits that a drawn or spaced value keeps at least, so that labels can be read."""
+
+MOST_READABLE = 1_000
+"""Values between two ends that so many digits tell apart."""
 
 MOST_VALUES = 10_000
 
@@ -171,7 +174,25 @@ class Choice(Axis):
         return tuple(self.choice)
 
 
-class Linspace(Axis):
+class _Spaced(Axis):
+    """Values at set distances between two ends, both included."""
+
+    def at(self, share: float) -> Any:
+        """Return one of the values."""
+        return self._value(int(share * self._size()))
+
+    def values(self) -> tuple[Any, ...]:
+        """Return all values."""
+        return tuple(self._value(i) for i in range(self._size()))
+
+    def _size(self) -> int:
+        raise NotImplementedError
+
+    def _value(self, i: int) -> Any:
+        raise NotImplementedError
+
+
+class Linspace(_Spaced):
     """Values at equal distances, both ends included."""
 
     linspace: Ends = Field(description="first and last value")
@@ -182,20 +203,15 @@ class Linspace(Axis):
         _ordered(self.linspace)
         return self
 
-    def at(self, share: float) -> Any:
-        """Return one of the values."""
-        return self._value(int(share * self.count))
-
-    def values(self) -> tuple[Any, ...]:
-        """Return all values."""
-        return tuple(self._value(i) for i in range(self.count))
+    def _size(self) -> int:
+        return self.count
 
     def _value(self, i: int) -> Any:
         (low, high), unit = common(self.linspace)
-        return written(low + i / (self.count - 1) * (high - low), unit, low, high)
+        return written(low + i / (self.count - 1) * (high - low), unit, low, high, self.count)
 
 
-class Logspace(Axis):
+class Logspace(_Spaced):
     """Values in equal ratios, both ends included."""
 
     logspace: Ends = Field(description="first and last value, above 0")
@@ -206,18 +222,13 @@ class Logspace(Axis):
         _ordered(self.logspace, above_zero=True)
         return self
 
-    def at(self, share: float) -> Any:
-        """Return one of the values."""
-        return self._value(int(share * self.count))
-
-    def values(self) -> tuple[Any, ...]:
-        """Return all values."""
-        return tuple(self._value(i) for i in range(self.count))
+    def _size(self) -> int:
+        return self.count
 
     def _value(self, i: int) -> Any:
         (low, high), unit = common(self.logspace)
         value = _between_logarithms(low, high, i / (self.count - 1))
-        return written(value, unit, low, high)
+        return written(value, unit, low, high, self.count)
 
 
 AXES: dict[str, type[Axis]] = {
@@ -267,9 +278,18 @@ def common(values: Sequence[Any]) -> tuple[list[float], str]:
     return [converted(number, own or unit, unit) for number, own in parts], unit
 
 
-def written(number: float, unit: str, low: float, high: float) -> float | str:
-    """Return a number between two ends, rounded for readers, with its unit if it has one."""
-    rounded = min(max(float(f"{number:.{DIGITS}g}"), low), high)
+def written(number: float, unit: str, low: float, high: float, count: int = 1) -> float | str:
+    """Return a number between two ends, rounded for readers, with its unit if it has one.
+
+    Args:
+        number: between the ends, in the unit.
+        unit: empty for a bare number.
+        low, high: the ends; where they are close together more digits are kept.
+        count: how many values there are between the ends that must differ.
+    """
+    finest = max(abs(low), abs(high)) / (high - low) * max(1.0, count / MOST_READABLE)
+    digits = DIGITS + max(0, math.floor(math.log10(finest)))
+    rounded = min(max(float(f"{number:.{digits}g}"), low), high)
     return f"{rounded:.15g} {unit}" if unit else rounded
 
 

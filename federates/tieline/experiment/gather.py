@@ -14,6 +14,7 @@ from tieline.experiment.manifest import run_facts, save_manifest, write_json
 from tieline.experiment.results import SUMMARY, Run, read_manifest
 from tieline.experiment.summary import summarise
 from tieline.experiment.supervise import ProcessUse
+from tieline.logs import merge
 from tieline.tables import salvage
 
 Word = Mapping[str, Any]
@@ -45,6 +46,7 @@ def gather(folders: Sequence[Path], target: Path) -> Path:
     for folder in folders:
         _copy(folder, target)
     salvage(target)
+    merge(target)
     reason = _reason(words)
     facts = run_facts(_outcome(words), target, manifest["seed"])
     result = {**manifest, **facts, "status": "incomplete", "reason": reason}

@@ -13,13 +13,13 @@ from tieline.errors import CosimError, InputError
 from tieline.experiment.desk import Message, Wire, connect, listen
 from tieline.experiment.door import Door, introduce
 from tieline.experiment.export import check_empty, lay_out
+from tieline.experiment.interrupts import interruptible
 from tieline.experiment.keys import KEY_VARIABLE
 from tieline.experiment.launch import (
     BROKER,
     COMMANDS,
     Outcome,
     Processes,
-    termination_as_interrupt,
 )
 from tieline.experiment.plan import PlannedRun
 from tieline.experiment.remote import Remote, Uplink
@@ -94,7 +94,7 @@ def serve(
     settings = _settings(planned)
     check_key(host, key)
     door = Door(planned, key, say)
-    with termination_as_interrupt(), ExitStack() as stack:
+    with interruptible(), ExitStack() as stack:
         wires = _admit(door, host, port, wait_s, say)
         for wire in wires.values():
             stack.callback(wire.close)
@@ -146,7 +146,7 @@ def join(
     settings = _settings(planned)
     check_key(broker[0], key)
     check_empty(folder)
-    with termination_as_interrupt(), closing(connect(*broker, wait_s)) as wire:
+    with interruptible(), closing(connect(*broker, wait_s)) as wire:
         helics_key = introduce(wire, planned, federate, key)
         port = _await_others(wire, federate, wait_s, say)
         place = {"broker_host": wire.other_address, "interface": wire.own_address}
@@ -160,6 +160,7 @@ def join(
             on_fault=uplink.end,
             on_word=uplink.hear,
             key=helics_key,
+            name=f"launcher_of_{federate}",
         )
         outcome = processes.run([(federate, [*commands[federate], str(folder / "run.json")])])
         _leave(wire)

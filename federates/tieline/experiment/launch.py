@@ -2,12 +2,10 @@
 
 import json
 import selectors
-import signal
 import sys
-import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -18,9 +16,13 @@ from tieline.cosim.interfaces import FEDERATES, GRID, NETWORK
 from tieline.cosim.ports import reserved_port
 from tieline.cosim.runfile import federation_of
 from tieline.errors import CosimError, TielineError
+from tieline.experiment.folder import write_json
 from tieline.experiment.guests import GuestProcess, guest_processes
+from tieline.experiment.interrupts import current_interrupts, interruptible
 from tieline.experiment.keys import keyed, new_key
 from tieline.experiment.remote import Remote
+from tieline.experiment.run_logs import RunLogs
+from tieline.experiment.strays import end_strays
 from tieline.experiment.supervise import Child, ProcessUse, Start, end_all, executed
 from tieline.experiment.watch import Progress, Suspect, Watch
 
@@ -38,7 +40,7 @@ COMMANDS: Mapping[str, Sequence[str]] = {
 _POLL_S = 0.1
 _SETTLE_S = 0.6
 _LINGER_S = 2.0
-_END_WITHIN_S = 9.2
+_END_WITHIN_S = 8.2
 _LEAST_GRACE_S = 1.0
 _MOST_GRACE_S = 5.0
 
@@ -105,7 +107,7 @@ def launch(
     settings, _ = federation_of(run)
     table = {**COMMANDS, **(commands or {})}
     with ExitStack() as stack:
-        stack.enter_context(termination_as_interrupt())
+        stack.enter_context(interruptible())
         if settings.core in ("inproc", "local"):
             starts = [(TOGETHER, [*table[TOGETHER], str(run_file)])]
         else:
@@ -133,6 +135,7 @@ class Processes:
         on_word: given every word as it came.
         start: how a federate or the broker comes to be.
         key: HELICS's, without which nobody joins; None asks for none.
+        name: of this launcher's own log.
     """
 
     def __init__(
@@ -147,15 +150,19 @@ class Processes:
         on_word: Callable[[Mapping[str, Any]], None] | None = None,
         start: Start = executed,
         key: str | None = None,
+        name: str = "launcher",
     ) -> None:
         self._folder = folder
+        self._logs = RunLogs(folder, watch, name)
         self._on_progress = on_progress
         self._watch = watch
         self._guests = list(guests)
+        self._has_guests = bool(guests)
         self._on_fault = on_fault
         self._on_word = on_word
         self._start_process = start
         self._key = key
+        self._interrupts = current_interrupts()
         self._children: dict[str, Child | Remote] = {remote.name: remote for remote in remotes}
         self._marks: dict[str, float] = {}
 
@@ -165,12 +172,19 @@ class Processes:
         try:
             self._start(starts, stagger_s)
             self._follow()
+            self._logs.ended()
         except BaseException as error:
-            if isinstance(error, KeyboardInterrupt) and self._on_fault is not None:
-                self._on_fault(Suspect(starts[0][0], "interrupted", CosimError.exit_code))
-            self._end()
-            self._salvage(error)
+            with self._interrupts.hold():
+                self._logs.failed(error)
+                if isinstance(error, KeyboardInterrupt) and self._on_fault is not None:
+                    self._on_fault(Suspect(starts[0][0], "interrupted", CosimError.exit_code))
+                self._end()
+                self._salvage(error)
+                if isinstance(error, KeyboardInterrupt):
+                    error.outcome = self._outcome()  # type: ignore[attr-defined]
             raise
+        finally:
+            self._logs.close()
         return self._outcome()
 
     def _start(self, starts: Sequence[tuple[str, list[str]]], stagger_s: float) -> None:
@@ -182,11 +196,14 @@ class Processes:
     def _start_one(
         self, name: str, command: Sequence[str], start: Start, *, has_word: bool
     ) -> None:
-        log = self._folder / "logs" / f"{name}.log"
         try:
-            self._children[name] = Child(name, command, log, keyed(start, self._key), has_word)
+            log = self._logs.of(name)
+            keyed_start = keyed(start, self._key)
+            child = Child(name, command, log, keyed_start, has_word, self._folder)
         except OSError as error:
             self._fail(Suspect(name, f"could not be started: {error}", CosimError.exit_code))
+        self._children[name] = child
+        self._logs.started(child, command)
 
     def _start_guests(self) -> None:
         """Start the guests once the federates are opened, so that none waits for a compiler."""
@@ -227,6 +244,7 @@ class Processes:
     def _hear(self) -> None:
         for child in self._children.values():
             for message in child.read():
+                self._logs.hear(message)
                 if self._on_word is not None:
                     self._on_word(message)
                 progress = self._watch.hear(message)
@@ -247,6 +265,7 @@ class Processes:
         self._fail(suspect)
 
     def _fail(self, suspect: Suspect) -> NoReturn:
+        self._logs.fault(suspect)
         if self._on_fault is not None:
             self._on_fault(suspect)
         self._end()
@@ -257,10 +276,15 @@ class Processes:
     def _end(self) -> None:
         children = tuple(self._children.values())
         left_s = _END_WITHIN_S - self._watch.silence_s
-        end_all(children, min(_MOST_GRACE_S, max(_LEAST_GRACE_S, left_s)))
+        grace_s = min(_MOST_GRACE_S, max(_LEAST_GRACE_S, left_s))
+        end_all(children, grace_s, lambda: self._interrupts.is_hurried)
+        if self._has_guests:
+            # A guest's own children may have left its group.
+            end_strays(str(self._folder.resolve()))
         self._hear()
         for child in children:
             child.close()
+            self._logs.used(child.use)
 
     def _outcome(self) -> Outcome:
         uses = (child.use for child in self._children.values())
@@ -285,26 +309,4 @@ class Processes:
 
 def _write_port(run_file: Path, run: dict[str, Any], port: int) -> None:
     run["federation"] = {**run["federation"], "broker_port": port}
-    part = run_file.with_suffix(".part")
-    part.write_text(json.dumps(run, indent=2) + "\n", encoding="utf-8")
-    part.replace(run_file)
-
-
-@contextmanager
-def termination_as_interrupt() -> Iterator[None]:
-    """Have SIGTERM end a run as Ctrl-C does; left alone outside the main thread or if handled."""
-    if (
-        threading.current_thread() is not threading.main_thread()
-        or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL
-    ):
-        yield
-        return
-
-    def interrupt(*_: object) -> NoReturn:
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    write_json(run_file, run)

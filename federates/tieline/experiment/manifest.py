@@ -9,10 +9,12 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import tieline
+from tieline.cosim.strangers import dropped_messages
+from tieline.experiment.folder import FORMAT, MANIFEST, write_json
 from tieline.experiment.launch import Outcome
 from tieline.experiment.plan import Plan, PlannedRun
-from tieline.experiment.results import FORMAT, MANIFEST, table_hash
 from tieline.experiment.sweep import Point
+from tieline.experiment.table_facts import table_facts
 from tieline.problems import Path, value_at
 
 _GENERATOR = (
@@ -22,14 +24,6 @@ _GENERATOR = (
 _STREAMS = "streams.json"
 
 _PACKAGES = ("helics", "numpy", "scipy", "numba", "pandas", "pyarrow", "pydantic", "networkx")
-
-
-def write_json(path: pathlib.Path, data: object) -> None:
-    """Write a JSON file that appears whole or not at all."""
-    text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
-    part = path.with_name(f".{path.name}.part")
-    part.write_text(text + "\n", encoding="utf-8")
-    part.replace(path)
 
 
 def versions() -> dict[str, str]:
@@ -148,12 +142,18 @@ def random_streams(seed: int, folder: pathlib.Path) -> dict[str, Any]:
 
 
 def run_facts(outcome: Outcome | None, folder: pathlib.Path, seed: int) -> dict[str, Any]:
-    """Return what a launch found out (if it got so far), the tables' hashes and the streams."""
-    hashes = {path.name: table_hash(path) for path in sorted(folder.glob("*.parquet"))}
-    found = {"tables": hashes, "random_streams": random_streams(seed, folder)}
+    """Return what a launch found out (if it got so far), `table_facts` and the random streams.
+
+    `dropped_messages` counts, by endpoint and source, what others sent there without being asked.
+    """
+    facts = {
+        **table_facts(folder),
+        "random_streams": random_streams(seed, folder),
+        "dropped_messages": dropped_messages(folder),
+    }
     if outcome is None:
-        return found
-    return found | {
+        return facts
+    return {
         "granted_ns": outcome.granted_ns,
         "times": {
             "wall_s": sum(outcome.wall_s.values()),
@@ -161,4 +161,5 @@ def run_facts(outcome: Outcome | None, folder: pathlib.Path, seed: int) -> dict[
             "cpu_s": {use.name: use.cpu_s for use in outcome.processes},
         },
         "peak_memory_bytes": {use.name: use.peak_bytes for use in outcome.processes},
+        **facts,
     }

@@ -11,29 +11,29 @@ from typing import Any
 import tieline
 from tieline.cosim.interfaces import GRID
 from tieline.errors import CosimError, InputError, TielineError
+from tieline.experiment.folder import MANIFEST, UNDER_WAY, put_in_place, write_json
+from tieline.experiment.interrupts import current_interrupts, interruptible
 from tieline.experiment.launch import Outcome
-from tieline.experiment.manifest import (
-    ended,
-    run_facts,
-    run_manifest,
-    save_manifest,
-    versions,
-    write_json,
-)
+from tieline.experiment.manifest import ended, run_facts, run_manifest, save_manifest, versions
 from tieline.experiment.plan import PlannedRun
-from tieline.experiment.results import MANIFEST, MAP, SUMMARY, Run, is_result, read_manifest
+from tieline.experiment.rescue import LAUNCHER, granted_text
+from tieline.experiment.results import MAP, SUMMARY, Run, is_result, read_manifest
 from tieline.experiment.summary import summarise
 from tieline.experiment.watch import Progress
 from tieline.tables import salvage
 from tieline.units import ns_to_seconds
 
-UNDER_WAY = "the run did not end: it is under way, or was killed"
+_RESERVE = ".reserve"
+_RESERVE_BYTES = 262_144
+"""Room for the manifest, and for small tables, that is kept free on a disk that runs full."""
 
 Launch = Callable[[Path, Callable[[Progress], None]], Outcome]
 """Runs the federation of a folder's run.json to its end, or raises a CosimError."""
 
 OnTime = Callable[[float], None]
 """Is told the simulated time that a run has reached, s."""
+
+OnProgress = Callable[[Progress], None]
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,13 @@ def task_of(planned: PlannedRun, folder: Path) -> Task:
     return Task(str(folder.resolve()), files, run_manifest(planned, {}, UNDER_WAY))
 
 
-def run_in(work: Path, task: Task, launch: Launch, on_time: OnTime | None = None) -> None:
+def run_in(
+    work: Path,
+    task: Task,
+    launch: Launch,
+    on_time: OnTime | None = None,
+    on_progress: OnProgress | None = None,
+) -> None:
     """Run a task in the folder `work`, which exists and is empty.
 
     If it fails, what was written is made readable and marked incomplete with the reason.
@@ -73,27 +79,63 @@ def run_in(work: Path, task: Task, launch: Launch, on_time: OnTime | None = None
     Raises:
         TielineError: the run failed.
     """
-    for name, content in task.files.items():
-        write_json(work / name, content)
     # Who runs it is what made it, whoever planned it.
     base = {**task.manifest, "versions": versions()}
-    save_manifest(work, base)
 
     def report(progress: Progress) -> None:
+        if on_progress is not None:
+            on_progress(progress)
         if on_time is not None and progress.federate == GRID:
             on_time(ns_to_seconds(max(0, progress.granted_ns)))
 
     outcome = None
     try:
+        _begin(work, task, base)
         outcome = launch(work, report)
         facts = run_facts(outcome, work, base["seed"])
         write_json(work / SUMMARY, summarise(Run(work, ended(base, facts, None))))
+        (work / _RESERVE).unlink()
+        save_manifest(work, ended(base, facts, None))
     except BaseException as error:
+        own = _own(error, outcome)
+        with current_interrupts().hold():
+            _save_incomplete(work, base, getattr(own, "outcome", outcome), own)
+        if own is error:
+            raise
+        raise own from error
+
+
+def _begin(work: Path, task: Task, base: Mapping[str, Any]) -> None:
+    for name, content in task.files.items():
+        write_json(work / name, content)
+    save_manifest(work, base)
+    (work / _RESERVE).write_bytes(bytes(_RESERVE_BYTES))
+
+
+def _own(error: BaseException, outcome: Outcome | None) -> BaseException:
+    """Return an error of this process's as the launcher's, with its file; any other as it is."""
+    if not isinstance(error, OSError):
+        return error
+    where = "" if error.filename is None else f" ({Path(error.filename).name})"
+    granted = "" if outcome is None else granted_text(outcome.granted_ns)
+    return CosimError(f"{LAUNCHER}: {error.strerror or error}{where}{granted}")
+
+
+def _save_incomplete(
+    work: Path, base: Mapping[str, Any], outcome: Outcome | None, error: BaseException
+) -> None:
+    """Make readable what was written, and say in the manifest why it is not whole."""
+    reserve = work / _RESERVE
+    try:
+        if reserve.is_file():
+            # The manifest keeps its part: tables could take all the room there is.
+            os.truncate(reserve, _RESERVE_BYTES // 2)
         salvage(work)
-        facts = run_facts(getattr(error, "outcome", outcome), work, base["seed"])
+        reserve.unlink(missing_ok=True)
+        facts = run_facts(outcome, work, base["seed"])
         save_manifest(work, ended(base, facts, reason_of(error)))
-        raise
-    save_manifest(work, ended(base, facts, None))
+    except (OSError, TielineError) as second:
+        error.add_note(f"what was written could not all be made readable: {second}")
 
 
 def run_task(work: Path, task: Task, launch: Launch, on_time: OnTime | None = None) -> None:
@@ -108,18 +150,20 @@ def run_task(work: Path, task: Task, launch: Launch, on_time: OnTime | None = No
     """
     check_version(task)
     work.mkdir(parents=True)
-    try:
-        run_in(work, task, launch, on_time)
-    except Exception:
-        if is_result(work):
-            put(work, Path(task.folder))
-        else:
+    with interruptible() as interrupts:
+        try:
+            run_in(work, task, launch, on_time)
+        except Exception:
+            if is_result(work):
+                put(work, Path(task.folder))
+            else:
+                shutil.rmtree(work, ignore_errors=True)
+            raise
+        except BaseException:
             shutil.rmtree(work, ignore_errors=True)
-        raise
-    except BaseException:
-        shutil.rmtree(work, ignore_errors=True)
-        raise
-    put(work, Path(task.folder))
+            raise
+        with interrupts.hold():
+            put(work, Path(task.folder))
 
 
 def work_folder(task: Task) -> Path:
@@ -133,9 +177,7 @@ def put(work: Path, folder: Path) -> None:
     if is_finished(folder, read_manifest(work)):
         shutil.rmtree(work)
         return
-    if folder.exists():
-        shutil.rmtree(folder)
-    work.rename(folder)
+    put_in_place(work, folder)
 
 
 def is_finished(folder: Path, wanted: Mapping[str, Any]) -> bool:
@@ -152,10 +194,15 @@ def is_finished(folder: Path, wanted: Mapping[str, Any]) -> bool:
 
 
 def mark_lost(work: Path, task: Task, reason: str) -> None:
-    """Keep what is left of a run whose own process is gone, marked incomplete with the reason."""
+    """Keep what is left of a run whose own process is gone, marked incomplete with the reason.
+
+    Raises:
+        OSError: the disk is full, or fails.
+    """
     if not (work / MANIFEST).is_file():
         shutil.rmtree(work, ignore_errors=True)
         return
+    (work / _RESERVE).unlink(missing_ok=True)
     salvage(work)
     facts = run_facts(None, work, task.manifest["seed"])
     save_manifest(work, ended(task.manifest, facts, reason))

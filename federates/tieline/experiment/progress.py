@@ -156,7 +156,13 @@ class _Bars:
 
     def __init__(self, points: Sequence[Point], console: Console) -> None:
         self._progress = Progress(
-            TextColumn("{task.description}"), BarColumn(), _Far(), _Rate(), console=console
+            TextColumn("{task.description}"),
+            BarColumn(),
+            _Far(),
+            _Rate(),
+            console=console,
+            # It would take a thread, and a process with threads cannot fork federates.
+            auto_refresh=False,
         )
         self._points = points
         self._tasks: dict[str, TaskID] = {}
@@ -178,7 +184,7 @@ class _Bars:
             total_s = point.experiment.grid.duration
             task = self._progress.add_task(name_of(point), total=total_s, is_time=True)
             self._tasks[point.slug] = task
-        self._progress.update(self._tasks[point.slug], completed=simulated_s)
+        self._progress.update(self._tasks[point.slug], completed=simulated_s, refresh=True)
 
     def kept(self, points: Sequence[Point]) -> None:
         """Move the bar of the sweep by what was finished before."""
@@ -197,7 +203,8 @@ class _Bars:
 
     def _move(self) -> None:
         if self._sweep is not None:
-            self._progress.update(self._sweep, completed=self._tally.ended, pace=self._tally.left())
+            done, left = self._tally.ended, self._tally.left()
+            self._progress.update(self._sweep, completed=done, pace=left, refresh=True)
 
 
 class _Far(ProgressColumn):

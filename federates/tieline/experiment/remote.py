@@ -67,6 +67,9 @@ class Remote:
         """Return False: nobody looks from here."""
         return False
 
+    def effort(self) -> None:
+        """Return None: nobody looks from here."""
+
     def tell(self, message: Mapping[str, Any]) -> None:
         """Send it a message."""
         self._wire.send(message)

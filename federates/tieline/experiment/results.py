@@ -1,24 +1,35 @@
 """Reads result folders: a run, or a sweep of runs; knows nothing of how they were made."""
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import pandas as pd
-import pyarrow.parquet as pq
+from tieline.experiment.folder import FORMAT, MANIFEST, is_result, read_json, read_manifest
+from tieline.experiment.table_facts import table_hash
+from tieline.tables import column_names, read_table, stored
 
-from tieline.errors import InputError
-from tieline.tables import column_names, read_table
+if TYPE_CHECKING:
+    import pandas as pd
 
-MANIFEST = "manifest.json"
+__all__ = [
+    "FORMAT",
+    "MANIFEST",
+    "MAP",
+    "POINTS",
+    "SUMMARY",
+    "Run",
+    "common_events",
+    "is_result",
+    "read_json",
+    "read_manifest",
+    "read_runs",
+    "table_hash",
+]
+
 SUMMARY = "summary.json"
 POINTS = "points"
 MAP = "map.json"
-FORMAT = "tieline-result/1"
 
 
 @dataclass(frozen=True)
@@ -57,15 +68,17 @@ class Run:
         """Return the summary."""
         return read_json(self.folder / SUMMARY)
 
-    def table(self, name: str, *columns: str) -> pd.DataFrame:
+    def table(self, name: str, *columns: str) -> "pd.DataFrame":
         """Return a table (`grid`, `flows`, ...), or some columns; no rows if it was not written."""
-        path = self.folder / f"{name}.parquet"
-        return read_table(path, columns or None) if path.is_file() else pd.DataFrame()
+        import pandas as pd
+
+        path = stored(self.folder / f"{name}.parquet")
+        return pd.DataFrame() if path is None else read_table(path, columns or None)
 
     def columns(self, name: str) -> list[str]:
         """Return the names of a table's columns; none if it was not written."""
-        path = self.folder / f"{name}.parquet"
-        return column_names(path) if path.is_file() else []
+        path = stored(self.folder / f"{name}.parquet")
+        return [] if path is None else column_names(path)
 
     def events(self) -> list[tuple[float, str]]:
         """Return (instant in s, what happens) of each event, in order of time."""
@@ -94,41 +107,6 @@ def common_events(runs: Sequence[Run]) -> list[tuple[float, str]]:
     return [event for event in logs[0] if all(event in log for log in logs)] if logs else []
 
 
-def read_json(path: Path) -> Any:
-    """Return what a JSON file of a result holds.
-
-    Raises:
-        InputError: it is missing or malformed.
-    """
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
-        raise InputError(f"{path}: is no JSON ({error})") from error
-
-
-def is_result(folder: Path) -> bool:
-    """Return whether a folder is a result of tieline, whole or not."""
-    try:
-        manifest = read_json(folder / MANIFEST)
-    except InputError:
-        return False
-    return isinstance(manifest, dict) and manifest.get("format") == FORMAT
-
-
-def read_manifest(folder: Path) -> Mapping[str, Any]:
-    """Return the manifest of a run or a sweep.
-
-    Raises:
-        InputError: the folder is no result.
-    """
-    if not is_result(folder):
-        raise InputError(f"{folder} is no result folder: it has no {MANIFEST} of {FORMAT}")
-    manifest: Mapping[str, Any] = read_json(folder / MANIFEST)
-    return manifest
-
-
 def read_runs(folder: Path) -> list[Run]:
     """Return the runs of a result, complete or not, in the order of its sweep.
 
@@ -140,25 +118,3 @@ def read_runs(folder: Path) -> list[Run]:
         return [Run(folder, manifest)]
     folders = [folder / POINTS / point["slug"] for point in manifest["points"]]
     return [Run(path, read_manifest(path)) for path in folders if is_result(path)]
-
-
-def table_hash(path: Path) -> str:
-    """Return the SHA-256 of what a table says: names, types and values of its columns, in order.
-
-    Row groups, compression and metadata do not enter, so tables with equal content have equal
-    hashes. A null in a column of numbers counts as NaN.
-    """
-    digest = hashlib.sha256()
-    table = pq.read_table(path)
-    for name in table.column_names:
-        column = table.column(name)
-        digest.update(f"{name}\n{column.type}\n{len(column)}\n".encode())
-        values = column.to_numpy()
-        if values.dtype == object:
-            texts = [None if value is None else str(value) for value in values]
-            digest.update(json.dumps(texts).encode())
-            continue
-        if values.dtype.kind == "f":
-            values = np.where(np.isnan(values), np.nan, values).astype(values.dtype)
-        digest.update(values.astype(values.dtype.newbyteorder("<")).tobytes())
-    return digest.hexdigest()

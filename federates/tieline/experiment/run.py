@@ -8,9 +8,18 @@ from datetime import datetime
 from pathlib import Path
 
 from tieline.errors import InputError, TielineError
+from tieline.experiment.folder import (
+    held,
+    is_result,
+    place_of_incomplete,
+    put_in_place,
+    read_manifest,
+)
+from tieline.experiment.interrupts import interruptible
+from tieline.experiment.keeper import kept
 from tieline.experiment.plan import Plan
 from tieline.experiment.point import Launch, run_in, task_of
-from tieline.experiment.results import is_result, read_manifest
+from tieline.experiment.rescue import take_up
 from tieline.experiment.sweep import Point
 from tieline.experiment.sweep_run import InTurn, Listener, RunFailedError, run_sweep
 
@@ -63,8 +72,9 @@ def execute(
 
     The folder of a single run is written beside the target under a temporary name and takes the
     target's name at the end, replacing an earlier result there. If the run fails, what was written
-    is kept, marked incomplete; an earlier result at the target is then left alone. A sweep goes on
-    in its folder, as `run_sweep` does.
+    is kept, marked incomplete; an earlier result at the target is then left alone. If this process
+    is killed the run's keeper sees to that, and if the keeper is killed, too, the next run beside
+    it does. A sweep goes on in its folder, as `run_sweep` does.
 
     Args:
         plan: what to run.
@@ -77,23 +87,30 @@ def execute(
         RunFailedError: a run failed.
     """
     check_target(target)
+    take_up(target.parent)
     if plan.study.is_sweep:
         return run_sweep(plan, target, InTurn(launch), Listener(on_progress))
-    work = _work_folder(target)
     task = task_of(plan.runs[0], target)
 
     def on_time(time_s: float) -> None:
         if on_progress is not None:
             on_progress(plan.runs[0].point, time_s)
 
-    try:
-        run_in(work, task, launch, on_time)
-    except TielineError as error:
-        raise RunFailedError(error, _keep_incomplete(work, target)) from error
-    except BaseException:
-        _keep_incomplete(work, target)
-        raise
-    _move(work, target)
+    with interruptible() as interrupts:
+        work = _work_folder(target)
+        with held(work), kept(work.resolve(), target.resolve()) as keeper:
+            try:
+                run_in(work, task, launch, on_time, keeper.note)
+            except TielineError as error:
+                with interrupts.hold():
+                    folder = _keep_incomplete(work, target)
+                raise RunFailedError(error, folder) from error
+            except BaseException:
+                with interrupts.hold():
+                    _keep_incomplete(work, target)
+                raise
+            with interrupts.hold():
+                put_in_place(work, target)
     return target
 
 
@@ -108,16 +125,11 @@ def _work_folder(target: Path) -> Path:
 
 def _keep_incomplete(work: Path, target: Path) -> Path:
     """Give a failed result a name that overwrites nothing whole, and return that."""
-    has_older = is_result(target) and read_manifest(target)["status"] == "complete"
-    kept = target.with_name(f"{target.name}-incomplete") if has_older else target
-    _move(work, kept)
-    return kept
-
-
-def _move(work: Path, target: Path) -> None:
-    older = work.with_name(f"{work.name}-older")
-    if target.is_dir() and any(target.iterdir()):
-        target.rename(older)
-    work.rename(target)
-    if older.exists():
-        shutil.rmtree(older)
+    if not is_result(work):
+        # It failed before there was anything to keep.
+        shutil.rmtree(work, ignore_errors=True)
+        return target
+    is_whole = read_manifest(work)["status"] == "complete"
+    folder = target if is_whole else place_of_incomplete(target)
+    put_in_place(work, folder)
+    return folder

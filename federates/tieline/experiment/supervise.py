@@ -1,6 +1,5 @@
 """One child process of a run: in a group of its own, heard, logged, ended and accounted for."""
 
-import collections
 import json
 import os
 import signal
@@ -14,10 +13,13 @@ from typing import IO, Any, Protocol
 
 import tieline
 from tieline.cosim.process import LAUNCHER_VARIABLE
+from tieline.experiment.strays import RUN_VARIABLE
+from tieline.experiment.watch import Effort
+from tieline.logs import LINE_BEGINS, Log, Record
 
-_LOG_LIMIT_BYTES = 1_000_000
-_TAIL_LINES = 8
 _READ_BYTES = 65_536
+_UTIME = 11
+"""Place of the processor time among the fields after a process's name in /proc/PID/stat."""
 _LONGEST_LINE_BYTES = 1_000_000
 
 
@@ -75,40 +77,16 @@ def executed(
     )
 
 
-class Log:
-    """A text file that stops growing at 1 MB, and its last lines, which are kept in any case."""
-
-    def __init__(self, path: Path) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self._file = path.open("wb")
-        self._left_bytes = _LOG_LIMIT_BYTES
-        self.tail: collections.deque[str] = collections.deque(maxlen=_TAIL_LINES)
-
-    def write(self, line: bytes) -> None:
-        """Add one line, given without its end."""
-        self.tail.append(line.decode(errors="replace"))
-        if self._left_bytes <= 0:
-            return
-        self._left_bytes -= len(line) + 1
-        self._file.write(line + b"\n")
-        if self._left_bytes <= 0:
-            self._file.write(f"(the log ends at {_LOG_LIMIT_BYTES} bytes)\n".encode())
-        self._file.flush()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
-
 class Child:
     """A process in its own session, whose standard output carries JSON lines.
 
     Args:
         name: what the run calls it.
         command: the program and its arguments.
-        log: where its standard error, and whatever else it says, is kept.
+        log: where what it logs and prints is kept.
         start: how the process comes to be.
         has_word: whether its standard output is a federate's, with words about itself.
+        run: the run's folder, which marks the process and whatever it starts in turn.
 
     Attributes:
         exit_code: None while it runs; negative for the signal that killed it.
@@ -119,9 +97,10 @@ class Child:
         self,
         name: str,
         command: Sequence[str],
-        log: Path,
+        log: Log,
         start: Start = executed,
         has_word: bool = True,
+        run: Path | None = None,
     ) -> None:
         self.name = name
         self.exit_code: int | None = None
@@ -129,9 +108,9 @@ class Child:
         self.use: ProcessUse | None = None
         self._peak_bytes = 0
         self._has_word = has_word
-        self.log = Log(log)
+        self.log = log
         try:
-            self._process = start(command, child_environment())
+            self._process = start(command, child_environment(run))
         except BaseException:
             self.log.close()
             raise
@@ -153,15 +132,18 @@ class Child:
         return tuple(self._pending)
 
     def read(self) -> Iterator[dict[str, Any]]:
-        """Yield the JSON lines that have come; everything else goes to the log."""
+        """Yield the words of federates that have come; those and all else go to the log."""
         for descriptor in tuple(self._pending):
             for line in self._lines(descriptor):
-                is_word = self._has_word and descriptor == self._stdout
-                message = _parsed(line) if is_word else None
-                if message is None:
-                    self.log.write(line)
+                is_stdout = descriptor == self._stdout
+                said = _parsed(line) if self._has_word and is_stdout else None
+                if isinstance(said, Record):
+                    self.log.add(said)
+                elif said is not None:
+                    self.log.hear(said)
+                    yield said
                 else:
-                    yield message
+                    self.log.take(line, is_error=not is_stdout)
 
     def poll(self) -> bool:
         """Return whether the process has ended; what is left of its group ends with it."""
@@ -187,6 +169,10 @@ class Child:
             return False
         return stat.rpartition(")")[2].split()[0] in ("T", "t")
 
+    def effort(self) -> Effort | None:
+        """Return what it has done so far; None where the kernel does not tell."""
+        return None if self.exit_code is not None else effort_of(self.pid)
+
     def terminate(self) -> None:
         """Ask the process to save and end; one that is stopped is woken for it."""
         if not self.poll():
@@ -202,8 +188,7 @@ class Child:
 
     def close(self) -> None:
         """Close pipes and log; the process has ended."""
-        for message in self.read():
-            self.log.write(json.dumps(message).encode())
+        drain([self])
         for stream in (self._process.stdout, self._process.stderr):
             if stream is not None:
                 stream.close()
@@ -231,13 +216,25 @@ class Child:
             yield from lines
 
 
-def end_all(children: Sequence[Process], grace_s: float) -> None:
-    """End every child: each may save for `grace_s` after SIGTERM, then its group is killed."""
+def end_all(
+    children: Sequence[Process],
+    grace_s: float,
+    is_hurried: Callable[[], bool] = lambda: False,
+) -> None:
+    """End every child: each may save for `grace_s` after SIGTERM, then its group is killed.
+
+    Args:
+        children: processes, ended or not.
+        grace_s: wall time, s.
+        is_hurried: whether they are to be killed at once.
+    """
     limit = time.monotonic() + grace_s
     try:
         for child in children:
             child.terminate()
         while time.monotonic() < limit and any(not child.poll() for child in children):
+            if is_hurried():
+                break
             time.sleep(0.02)
             drain(children)
     finally:
@@ -270,10 +267,26 @@ def shared_environment(before: Mapping[str, str]) -> dict[str, str]:
     return shared
 
 
-def child_environment() -> dict[str, str]:
-    """Return the environment of a process that must not outlive this one."""
+def child_environment(run: Path | None = None) -> dict[str, str]:
+    """Return the environment of a process that must not outlive this one, nor a run's folder."""
     own = {LAUNCHER_VARIABLE: str(os.getpid())}
+    if run is not None:
+        own[RUN_VARIABLE] = str(run.resolve())
     return dict(os.environ) | shared_environment(os.environ) | own
+
+
+def effort_of(pid: int) -> Effort | None:
+    """Return what a living process has done so far; None where the kernel does not tell."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+        io = Path(f"/proc/{pid}/io").read_text(encoding="ascii")
+    except OSError:
+        return None
+    fields = stat.rpartition(")")[2].split()
+    ticks = int(fields[_UTIME]) + int(fields[_UTIME + 1])
+    moved = dict(line.split(": ") for line in io.splitlines())
+    disk_bytes = int(moved["read_bytes"]) + int(moved["write_bytes"])
+    return Effort(ticks / os.sysconf("SC_CLK_TCK"), disk_bytes)
 
 
 def _peak_bytes(pid: int) -> int:
@@ -298,11 +311,14 @@ def _read(descriptor: int) -> bytes | None:
         return None
 
 
-def _parsed(line: bytes) -> dict[str, Any] | None:
-    if not line.startswith(b'{"federate"'):
-        return None
+def _parsed(line: bytes) -> dict[str, Any] | Record | None:
+    """Return a federate's word or record, None for what is neither."""
     try:
-        message: dict[str, Any] = json.loads(line)
+        if line.startswith(LINE_BEGINS):
+            return Record.from_line(line)
+        if line.startswith(b'{"federate"'):
+            word: dict[str, Any] = json.loads(line)
+            return word
     except ValueError:
         return None
-    return message
+    return None

@@ -1,8 +1,5 @@
 """Runs the points of a sweep into one folder: what is finished stays, what failed is listed."""
 
-import errno
-import fcntl
-import os
 import shutil
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
@@ -12,11 +9,12 @@ from pathlib import Path
 from typing import Protocol
 
 from tieline.errors import InputError, TielineError
-from tieline.experiment.launch import termination_as_interrupt
-from tieline.experiment.manifest import save_manifest, sweep_manifest, write_json
+from tieline.experiment.folder import UNDER_WAY, held, write_json
+from tieline.experiment.interrupts import interruptible
+from tieline.experiment.keeper import kept
+from tieline.experiment.manifest import save_manifest, sweep_manifest
 from tieline.experiment.plan import Plan
 from tieline.experiment.point import (
-    UNDER_WAY,
     Launch,
     Task,
     is_finished,
@@ -159,7 +157,7 @@ def _run_due(plan: Plan, target: Path, runner: Runner, listener: Listener, is_fr
     _discard(tasks[i] for i in due)
     save_manifest(target, sweep_manifest(plan, reason))
     try:
-        with termination_as_interrupt():
+        with interruptible(), kept(target.resolve(), target.resolve()):
             failures = _failures(runner, {i: tasks[i] for i in due}, points, listener)
         reason = _told(failures, len(points))
     except BaseException as error:
@@ -222,22 +220,12 @@ def _alone_in(target: Path) -> Iterator[None]:
     Raises:
         InputError: another sweep is at work in it.
     """
-    descriptor = os.open(target, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        os.close(descriptor)
-        raise InputError(
-            f"another sweep is at work in {target}: wait for its end, or give another folder"
-        ) from error
-    except OSError as error:
-        # Some shared file systems lock no folders; a sweep must run there, too.
-        if error.errno not in (errno.ENOLCK, errno.EBADF, errno.EOPNOTSUPP):
-            raise
-    try:
+    with held(target) as is_free:
+        if not is_free:
+            raise InputError(
+                f"another sweep is at work in {target}: wait for its end, or give another folder"
+            )
         yield
-    finally:
-        os.close(descriptor)
 
 
 def _close_folder(plan: Plan, target: Path, reason: str | None) -> None:

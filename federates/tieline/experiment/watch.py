@@ -9,6 +9,16 @@ from tieline.cosim.interfaces import FEDERATES, FederationSettings
 from tieline.errors import CosimError
 from tieline.units import ns_to_seconds
 
+STOPPED_S = 3.0
+"""Longest silence while a process is held by a signal: nobody computes like that."""
+PATIENCE = 5.0
+"""How many times the longest meeting so far the next one may take, if somebody works on it."""
+PATIENCE_FIRST = 2.0
+"""The same for the first meeting, which may have compiled."""
+LONG_S = 600.0
+"""The same, where a federate may rightly work for long before there is a meeting to learn from."""
+
+_WORKING_SHARE = 0.05
 _LONGEST_PASS_S = 0.5
 _LEAST_CPU_S = 0.05
 _DONE = ("finished", "failed")
@@ -36,6 +46,14 @@ class Suspect:
     is_certain: bool = True
 
 
+@dataclass(frozen=True)
+class Effort:
+    """What a process has done since it began: processor time, s, and bytes from and to disks."""
+
+    cpu_s: float
+    disk_bytes: int
+
+
 class Process(Protocol):
     """What is looked at of a process; `reason` may say more than its exit code does."""
 
@@ -45,6 +63,9 @@ class Process(Protocol):
     def is_stopped(self) -> bool:
         """Return whether a signal holds it."""
 
+    def effort(self) -> Effort | None:
+        """Return what it has done; None if that is not known."""
+
 
 class Watch:
     """What is known of the federates, and for how long none of them has come further.
@@ -52,6 +73,11 @@ class Watch:
     Coming further is a new state or a new grant. Where a federate may rightly work for long
     without either (opening its participant, its first interval, when code is compiled, and
     writing its results) its processor time counts, too.
+
+    How long a silence may last depends on what the federates' processes do in it. If none of them
+    works, `hang_timeout` is the limit in any phase. If one does, the run's own longest meeting so
+    far sets it, times `PATIENCE`, where that is longer; before there is one, and while results are
+    written, `LONG_S` does. Guests may wait for something outside: how much they work is no sign.
 
     Args:
         settings: of the federation.
@@ -75,22 +101,33 @@ class Watch:
         self._bystanders = (*self._guests, *bystanders)
         self._last: dict[str, dict[str, Any]] = {}
         self._cpu_s: dict[str, float] = {}
+        self._learned_s = 0.0
+        self._meeting_s = 0.0
+        self._efforts: tuple[float, dict[str, Effort]] | None = None
+        self._works_on: bool | None = None
 
     def hear(self, message: Mapping[str, Any]) -> Progress | None:
         """Take one word in; return it as progress, or None when it is not a federate's."""
         name = str(message.get("federate"))
         before = self._last.get(name, {})
         self._last[name] = dict(message)
-        if _place(message) != _place(before) or self._works(name, message):
-            self._cpu_s[name] = _cpu_s(message)
-            self.silence_s = 0.0
+        if _place(message) != _place(before):
+            if self.is_running() and before.get("state") == message.get("state"):
+                patience = PATIENCE if before.get("k", -1) > 0 else PATIENCE_FIRST
+                self._learned_s = max(self._learned_s, patience * self._meeting_s)
+            self._meeting_s = 0.0
+            self._break_silence(name, message)
+        elif self._works(name, message):
+            self._break_silence(name, message)
         if name not in self._members:
             return None
         return Progress(name, message["state"], message["k"], message["granted_ns"])
 
     def pass_time(self, elapsed_s: float) -> None:
         """Let wall time pass; a launcher that was itself held for long counts little of it."""
-        self.silence_s += min(elapsed_s, _LONGEST_PASS_S)
+        passed_s = min(elapsed_s, _LONGEST_PASS_S)
+        self.silence_s += passed_s
+        self._meeting_s += passed_s
 
     def granted_ns(self) -> dict[str, int]:
         """Return the last time granted to each federate, -1 for none."""
@@ -110,6 +147,7 @@ class Watch:
 
     def suspect(self, processes: Mapping[str, Process]) -> Suspect | None:
         """Return who is at fault so far, the surest sign first."""
+        self._look_for_work(processes)
         return (
             self._failed_by_itself()
             or self._dead(processes)
@@ -121,6 +159,44 @@ class Watch:
 
     def _state(self, name: str) -> str:
         return str(self._last.get(name, {}).get("state", "starting"))
+
+    def _break_silence(self, name: str, message: Mapping[str, Any]) -> None:
+        self._cpu_s[name] = _cpu_s(message)
+        self.silence_s = 0.0
+        self._efforts = None
+        self._works_on = None
+
+    def _look_for_work(self, processes: Mapping[str, Process]) -> None:
+        """Compare what the federates' processes do in the second half of a silence."""
+        half_s = self._settings.hang_timeout / 2
+        if self.silence_s < half_s:
+            return
+        now = {
+            name: effort
+            for name, process in processes.items()
+            if name not in self._guests and (effort := process.effort()) is not None
+        }
+        if self._efforts is None:
+            self._efforts = (self.silence_s, now)
+            return
+        since_s, before = self._efforts
+        elapsed_s = self.silence_s - since_s
+        if elapsed_s < half_s:
+            return
+        works = any(
+            now[name].cpu_s - before[name].cpu_s >= _WORKING_SHARE * elapsed_s
+            or now[name].disk_bytes > before[name].disk_bytes
+            for name in before.keys() & now.keys()
+        )
+        # One that died, or is on another host, may have worked: then nobody is called idle.
+        alive = {
+            name
+            for name, process in processes.items()
+            if name not in self._guests and process.exit_code is None
+        }
+        is_known = before.keys() == now.keys() == alive
+        self._works_on = True if works else False if is_known else None
+        self._efforts = (self.silence_s, now)
 
     def _works(self, name: str, message: Mapping[str, Any]) -> bool:
         may_be_long = message["state"] in ("opening", "finishing") or message.get("k") == 0
@@ -141,7 +217,7 @@ class Watch:
         return None
 
     def _stopped(self, processes: Mapping[str, Process]) -> Suspect | None:
-        limit_s, _ = self._limit()
+        limit_s = min(STOPPED_S, self._limit()[0])
         is_due = self.silence_s > limit_s or any(self._has_failed(name) for name in self._members)
         for name, process in processes.items():
             if is_due and process.is_stopped():
@@ -181,16 +257,34 @@ class Watch:
         ]
         if guests and self._is_guests_turn():
             name = " or ".join(guests)
-            reason = f"hung: {what} for {limit_s:g} s of wall time, and the others wait"
+            reason = f"hung: {what} for {limit_s:.3g} s of wall time, and the others wait"
             return Suspect(name, reason, CosimError.exit_code)
         name = min(self._members, key=self._blame)
-        reason = f"hung: {what} for {limit_s:g} s of wall time{self._when(name)}"
+        manner = ", and no process worked" if self._works_on is False else ""
+        reason = f"hung: {what} for {limit_s:.3g} s of wall time{manner}{self._when(name)}"
         return Suspect(name, reason, CosimError.exit_code)
 
     def _limit(self) -> tuple[float, str]:
+        """Return how long the silence may last, s, and what does not happen in it."""
+        least_s = self._settings.hang_timeout
         if self.is_running():
-            return self._settings.hang_timeout, "no federate was granted anything"
-        return self._settings.start_timeout, "it has not joined the federation"
+            what = "no federate was granted anything"
+            if self._works_on is False and not self._has_guests_turn():
+                return least_s, what
+            if self._works_on and self._may_be_long():
+                return max(least_s, LONG_S), what
+            return max(least_s, self._learned_s), what
+        what, start_s = "it has not joined the federation", self._settings.start_timeout
+        if self._works_on is False and not self._has_guests_turn():
+            return min(least_s, start_s), what
+        return start_s, what
+
+    def _may_be_long(self) -> bool:
+        words = [self._last.get(name, {}) for name in self._members]
+        return any(word.get("k", -1) < 1 or word.get("state") == "finishing" for word in words)
+
+    def _has_guests_turn(self) -> bool:
+        return bool(self._guests) and self._is_guests_turn()
 
     def _is_guests_turn(self) -> bool:
         """Return whether the federates have all asked for a grant, or all wait for the start."""
@@ -209,10 +303,14 @@ class Watch:
         return _STATES.index(self._state(name)), *turn
 
     def _when(self, name: str) -> str:
-        granted_ns = self._last.get(name, {}).get("granted_ns", -1)
-        if granted_ns < 0:
-            return f" (while {self._state(name)})" if name in self._members else ""
-        return f" (last granted {ns_to_seconds(granted_ns):.6f} s)"
+        granted_ns = self.granted_ns()
+        if name not in self._members:
+            latest_ns = max(granted_ns.values(), default=-1)
+            told = f" (last granted {ns_to_seconds(latest_ns):.6f} s to the others)"
+            return told if latest_ns >= 0 else ""
+        if granted_ns[name] < 0:
+            return f" (while {self._state(name)})"
+        return f" (last granted {ns_to_seconds(granted_ns[name]):.6f} s)"
 
     def _whose(self, name: str) -> Sequence[str]:
         """Return the federates whose state speaks for a process."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tieline.cosim.border import DeliveryBorder
 from tieline.cosim.guests import Command, GuestSettings, unit_owners
 from tieline.cosim.interfaces import GRID, Clock, DeliveryBundle, FrameBundle
 from tieline.errors import CosimError, TimeContractBroken
@@ -16,6 +17,7 @@ from tieline.grid.case import Case, load_case
 from tieline.grid.check import sensor_buses
 from tieline.grid.devices import with_pss
 from tieline.grid.events import plan_events
+from tieline.grid.finite import LARGEST_IN_A_FRAME, check_finite
 from tieline.grid.load_mix import with_load_mix
 from tieline.grid.models.registry import use_file
 from tieline.grid.modulation import Modulation
@@ -23,12 +25,14 @@ from tieline.grid.plan import HELD, Average
 from tieline.grid.powerflow import solve_power_flow
 from tieline.grid.recorder import Recorder
 from tieline.grid.settings import GridSettings
-from tieline.grid.simulation import Grid
+from tieline.grid.simulation import Grid, Reading
 from tieline.grid.system import build_system, sensor_average
 from tieline.tables import Column, write_table
 from tieline.units import NS_PER_S, seconds_to_ns, tick_ns
-from tieline.wams import PmuReporter, WideAreaAverage
+from tieline.wams import Fate, PmuReporter, Readings, WideAreaAverage
 from tieline.wams.settings import WamsSettings
+
+_TAG_ROUNDING_NS = 500
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -111,7 +115,10 @@ class GridFederate:
         self._per_record = settings.steps_per_second // settings.records_per_second
         idcodes = np.arange(1, len(sensors) + 1)
         f0_hz = float(case.base.frequency_Hz)
-        self._reporter = PmuReporter(idcodes, case.buses.base_kV[system.sensor_bus] * 1e3)
+        self._sensors = sensors
+        self._base_v = case.buses.base_kV[system.sensor_bus] * 1e3
+        self._reporter = PmuReporter(idcodes, self._base_v)
+        self._border = DeliveryBorder(clock, len(sensors), len(run.fitted))
         self._belief = WideAreaAverage(len(run.fitted), idcodes, weights, f0_hz)
         is_fitted = np.zeros(len(case.units))
         is_fitted[run.fitted] = 1.0
@@ -126,13 +133,19 @@ class GridFederate:
         """Integrate [t_k, t_k+1], each delivery at its step boundary; return the frames of t_k+1.
 
         Raises:
-            TimeContractBroken: a delivery lies outside the interval.
-            NumericalError: the integration failed.
+            TimeContractBroken: as `DeliveryBorder.check`, or a frame's own time tag lies behind
+                its arrival.
+            NumericalError: the integration failed, or what is to be recorded or sent is not
+                finite.
         """
         bundle = DeliveryBundle.from_bytes(received)
+        self._border.check(k, bundle)
         first, last = k * self._per_interval, (k + 1) * self._per_interval
-        ticks = self._boundaries(bundle, first, last)
+        arrivals_ns = bundle.records["arrival_ns"].astype(np.int64)
+        # The first step boundary at or after each arrival.
+        ticks = -(-arrivals_ns * self._grid.steps_per_second // NS_PER_S)
         readings = self._belief.read(bundle.payloads)
+        _check_tags(bundle, arrivals_ns, readings)
         seen = 0
         for tick in sorted({*self._record_ticks(first, last), first, last}):
             until = int(np.searchsorted(ticks, tick, side="right"))
@@ -202,32 +215,35 @@ class GridFederate:
         start = -(-first // self._per_record) * self._per_record
         return range(start, last, self._per_record)
 
-    def _boundaries(self, bundle: DeliveryBundle, first: int, last: int) -> Integers:
-        """Return (deliveries,) the first step boundary at or after each arrival.
-
-        Raises:
-            TimeContractBroken: a delivery lies outside the interval.
-        """
-        rate = self._grid.steps_per_second
-        arrival = bundle.records["arrival_ns"].astype(np.int64)
-        since, until = tick_ns(first, rate), tick_ns(last, rate)
-        if len(arrival) and not (since <= arrival.min() and arrival.max() <= until):
-            raise TimeContractBroken(
-                f"deliveries at {arrival.min()} to {arrival.max()} ns came for the interval from "
-                f"{since} to {until} ns"
-            )
-        return -(-arrival * rate // NS_PER_S)
-
     def _frames(self, tick: int) -> bytes:
         """Return the frames of a tick; none when the average needs none, or the run is over."""
         now_ns = tick_ns(tick, self._grid.steps_per_second)
         if self._run.delay_ns is not None or self._grid.ending is not None:
             return FrameBundle(now_ns, np.zeros((0, 0), np.uint8)).to_bytes()
         reading = self._grid.reading()
+        self._check_reading(reading)
         payloads = self._reporter.frames(
             now_ns, reading.v, reading.f_hz, reading.rocof_hz_s, reading.is_live
         )
         return FrameBundle(now_ns, payloads).to_bytes()
+
+    def _check_reading(self, reading: Reading) -> None:
+        """Refuse what no frame can carry.
+
+        Raises:
+            NumericalError: a PMU's phasor, frequency or its rate of change is not finite, or too
+                large for single precision.
+        """
+        quantities = {
+            "v_V": reading.v * self._base_v,
+            "f_hz": reading.f_hz,
+            "rocof_hz_s": reading.rocof_hz_s,
+        }
+        at_s = self._grid.tick / self._grid.steps_per_second
+        for name, values in quantities.items():
+            check_finite(
+                values, lambda i, name=name: f"{name}.B{self._sensors[i]}", at_s, LARGEST_IN_A_FRAME
+            )
 
     def _record(self) -> None:
         if self._grid.ending is not None:
@@ -238,6 +254,23 @@ class GridFederate:
         else:
             age_s = np.full(len(self._run.fitted), min(now_ns, self._run.delay_ns) / NS_PER_S)
         self._recorder.record(age_s)
+
+
+def _check_tags(bundle: DeliveryBundle, arrivals_ns: Integers, readings: Readings) -> None:
+    """Refuse a sound frame that says itself that it was measured after its arrival.
+
+    Raises:
+        TimeContractBroken: there is one.
+    """
+    rows = bundle.records["payload"]
+    # Time tags are whole microseconds, rounded.
+    is_early = readings.tags_ns[rows] > arrivals_ns + _TAG_ROUNDING_NS
+    for place in np.flatnonzero(is_early & (readings.fates[rows] == Fate.ACCEPTED))[:1]:
+        record = bundle.records[place]
+        raise TimeContractBroken(
+            f"{GRID}: frame {record['sequence']} of PMU {record['source']} arrived at "
+            f"{arrivals_ns[place]} ns, but its time tag says {readings.tags_ns[rows[place]]} ns"
+        )
 
 
 def _average(run: GridRun, sensors: Sequence[int], weights: Floats) -> Average:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tieline.grid.finite import check_finite
 from tieline.grid.simulation import Grid
 from tieline.tables import Column, TableStream
 
@@ -61,7 +62,11 @@ class Recorder:
         self._filled = 0
 
     def record(self, age_s: Floats) -> None:
-        """Add a row for the grid as it is; `age_s` (controllers,) is of its controllers' data."""
+        """Add a row for the grid as it is; `age_s` (controllers,) is of its controllers' data.
+
+        Raises:
+            NumericalError: a value of the row is not finite; the row is left out.
+        """
         grid = self._grid
         parts: list[Floats] = [
             np.array([grid.tick / grid.steps_per_second, grid.centre_of_inertia()])
@@ -70,7 +75,9 @@ class Recorder:
             values = grid.signal(signal)
             parts.append(values * self._to_system_base if name == "Pe_pu" else values)
         parts += [age_s, grid.reading().f_hz, np.abs(grid.voltages())]
-        self._block[:, self._filled] = np.concatenate(parts)
+        row = np.concatenate(parts)
+        check_finite(row, self._names.__getitem__, float(row[0]))
+        self._block[:, self._filled] = row
         self._filled += 1
         if self._filled == ROWS_PER_BLOCK:
             self._write()

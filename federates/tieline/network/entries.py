@@ -279,10 +279,10 @@ class Entries:
         graph: nx.Graph[str] = nx.Graph()
         graph.add_nodes_from(self._names)
         for raw in self._list("links"):
-            a, b = (raw.get("a"), raw.get("b")) if isinstance(raw, dict) else (None, None)
-            if a not in self._names or b not in self._names:
+            ends = (raw.get("a"), raw.get("b")) if isinstance(raw, dict) else (None, None)
+            if not all(isinstance(end, str) and end in self._names for end in ends):
                 return
-            graph.add_edge(str(a), str(b))
+            graph.add_edge(*ends)
         parts = sorted(nx.connected_components(graph), key=lambda part: (-len(part), min(part)))
         for part in parts[1:]:
             self._findings.add(("nodes", min(part)), self._cut_off(part))

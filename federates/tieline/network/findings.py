@@ -95,7 +95,7 @@ class Findings:
             self.add(position, f"{name} must hold keys and values (got {_shown(value)})")
         elif tag not in value:
             self.add(position, f"{name} lacks '{tag}' (allowed: {', '.join(models)})")
-        elif value[tag] not in models:
+        elif not isinstance(value[tag], str) or value[tag] not in models:
             self._unknown(tag, value[tag], models, (*position, tag))
         else:
             return self.entry(value, position, models[value[tag]])

@@ -6,6 +6,7 @@ import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from tieline.errors import InputError
 from tieline.figures import PANEL_INCHES, STYLE, colours, save
@@ -120,9 +121,9 @@ def _bands(series: pd.DataFrame, line: str, edges: tuple[str, str], legend: str)
     panels = figure.subplots(1, max(1, len(places)), sharey=True, squeeze=False)[0]
     values = 1e3 * series[[line, edges[1]]]
     is_wide = values.max().max() > WIDE * values[line].min()
+    everyone = _end_to_end(series, line)
     for axes, unit, colour in zip(panels, means.index[places], colours(len(places)), strict=False):
-        for _, other in series.groupby("unit"):
-            axes.plot(other["t_s"], 1e3 * other[line], color="0.8", linewidth=0.4)
+        axes.plot(*everyone, color="0.8", linewidth=0.4)
         own = series[series["unit"] == unit]
         low, high = (1e3 * own[edge] for edge in edges)
         axes.fill_between(own["t_s"], low, high, color=colour, alpha=0.35, linewidth=0, zorder=3)
@@ -133,6 +134,17 @@ def _bands(series: pd.DataFrame, line: str, edges: tuple[str, str], legend: str)
             axes.set_yscale("log")
     figure.supxlabel(f"time, s ({legend}; grey: all controllers)", fontsize=9.0)
     return figure
+
+
+def _end_to_end(series: pd.DataFrame, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return instants in s and values in ms of all controllers, a gap between each two.
+
+    One line with gaps is drawn in a fraction of the time of a line each.
+    """
+    parts = [part for _, part in series.groupby("unit")]
+    times = [value for part in parts for value in (*part["t_s"], np.nan)]
+    values = [value for part in parts for value in (*(1e3 * part[name]), np.nan)]
+    return np.array(times), np.array(values)
 
 
 def _series(folder: Path, name: str) -> pd.DataFrame:

@@ -165,5 +165,9 @@ def _error(order: _Order, exit_code: int) -> TielineError | None:
         error = TielineError(f"its process ended with exit code {exit_code}")
     error.exit_code = exit_code if exit_code > 0 else TielineError.exit_code
     if order.work.exists():
-        mark_lost(order.work, order.task, str(error))
+        try:
+            mark_lost(order.work, order.task, str(error))
+        except Exception as second:
+            # Whoever waits for this point must hear of it all the same.
+            error.add_note(f"what it wrote could not be made readable: {second}")
     return error

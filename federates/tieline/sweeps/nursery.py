@@ -28,10 +28,7 @@ from tieline.experiment.launch import launch
 from tieline.experiment.point import Task, run_task
 from tieline.experiment.watch import Progress
 from tieline.sweeps.fork import fork, forked
-
-# In this order: HELICS's ZeroMQ must not be loaded before the system's C++ runtime.
-_MODULES = ("tieline.network.federate", "tieline.grid.federate")
-_WITH_HELICS = ("tieline.cosim.federate", "tieline.cosim.inproc")
+from tieline.sweeps.single import FEDERATES, WITH_HELICS
 
 _REHEARSED_INTERVALS = 2
 _REHEARSED_ENGINES = ("ideal", "constant", "packet", "empirical")
@@ -180,7 +177,7 @@ class _Reporter:
 
 def _prepare(order: Mapping[str, Any]) -> str:
     """Import and rehearse; return what came of the rehearsal."""
-    modules = _MODULES if order["core"] == "local" else (*_MODULES, *_WITH_HELICS)
+    modules = FEDERATES if order["core"] == "local" else (*FEDERATES, *WITH_HELICS)
     for module in modules:
         importlib.import_module(module)
     run = order["rehearsal"]

@@ -147,7 +147,10 @@ class WideAreaAverage:
         sensors = self._sensor_of[frames["IDCODE"]]
         fates[(fates == _ACCEPTED) & (sensors == _UNKNOWN)] = Fate.UNKNOWN_IDCODE
         tags_ns = times_ns(frames, self._epoch_s)
-        return Readings(fates, sensors, tags_ns, frames["FREQ"].astype(np.float64))
+        # A signalling NaN, of a frame that is refused, stays a NaN; NumPy warns of it.
+        with np.errstate(invalid="ignore"):
+            f_hz = frames["FREQ"].astype(np.float64)
+        return Readings(fates, sensors, tags_ns, f_hz)
 
     def apply(
         self,
