@@ -376,6 +376,8 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="file for every figure")
     parser.add_argument("--fault", action="append", choices=list(FAULTS), help="only this one")
     asked = parser.parse_args()
+    # A shell's background jobs ignore Ctrl-C, and hand that on to what they start.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     faults = asked.fault or list(FAULTS)
     table: dict[str, list[Result]] = {}
     # The three ways at once: what is waited for is mostly patience.

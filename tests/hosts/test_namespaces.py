@@ -5,6 +5,7 @@ grid     10.213.77.2 --+-- each frame 5 ms later
 network  10.213.77.3 --+
 """
 
+import os
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
@@ -15,6 +16,7 @@ import pytest
 from hosts.namespaces import command_in, hosts, why_not
 from scenarios.study import run
 from tieline.experiment.gather import gather
+from tieline.experiment.keys import KEY_VARIABLE
 from tieline.experiment.results import Run, read_runs
 
 RUNNER = str(Path(__file__).parents[2] / "runner.py")
@@ -46,7 +48,10 @@ def start(where: str, *words: str) -> "subprocess.Popen[str]":
     for setting in SHORT:
         command += ["--set", setting]
     output = subprocess.PIPE
-    return subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, text=True)
+    environment = os.environ | {KEY_VARIABLE: "a key for three hosts"}
+    return subprocess.Popen(
+        command, stdout=output, stderr=subprocess.STDOUT, text=True, env=environment
+    )
 
 
 @pytest.mark.parametrize("core", ["zmq", "tcp"])

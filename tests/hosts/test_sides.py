@@ -19,7 +19,8 @@ from tieline.cosim.ports import reserved_port
 from tieline.errors import CosimError, InputError, TielineError
 from tieline.experiment.desk import connect, hello, refusal
 from tieline.experiment.gather import GatheredIncompleteError, gather
-from tieline.experiment.hosts import check_address, join, serve
+from tieline.experiment.hosts import check_address, check_key, join, serve
+from tieline.experiment.keys import KEY_VARIABLE, given_key
 from tieline.experiment.launch import launch
 from tieline.experiment.plan import PlannedRun
 from tieline.experiment.results import read_manifest
@@ -27,6 +28,7 @@ from tieline.experiment.watch import Progress
 
 ENDLESS = 100_000
 WAIT_S = 30.0
+KEY = "not-to-be-guessed-by-anyone"
 
 
 def planned(folder: Path, intervals: int = 20, core: str = "zmq") -> PlannedRun:
@@ -43,22 +45,37 @@ def planned(folder: Path, intervals: int = 20, core: str = "zmq") -> PlannedRun:
 class Sides:
     """Broker, grid and network on threads; what each raised stands in `raised`."""
 
-    def __init__(self, folder: Path, run: PlannedRun) -> None:
+    def __init__(self, folder: Path, run: PlannedRun, **keys: str) -> None:
+        self.keys = keys
         self.raised: dict[str, TielineError] = {}
         self.folders = {name: folder / name for name in FEDERATES}
         self._run = run
+        self.wait_s = WAIT_S
 
     def run(self, on_progress: Callable[[Progress], None] | None = None) -> None:
         """Run all three to their end."""
         with reserved_port() as port:
             calls: dict[str, Callable[[], Any]] = {
                 "broker": lambda: serve(
-                    self._run, "127.0.0.1", port, WAIT_S, lambda _: None, on_progress
+                    self._run,
+                    "127.0.0.1",
+                    port,
+                    self.wait_s,
+                    lambda _: None,
+                    on_progress,
+                    self.keys.get("broker"),
                 )
             }
             for name, folder in self.folders.items():
                 calls[name] = lambda name=name, folder=folder: join(
-                    self._run, name, ("127.0.0.1", port), folder, WAIT_S, lambda _: None, COMMANDS
+                    self._run,
+                    name,
+                    ("127.0.0.1", port),
+                    folder,
+                    WAIT_S,
+                    lambda _: None,
+                    COMMANDS,
+                    self.keys.get(name),
                 )
             threads = [threading.Thread(target=self._call, args=item) for item in calls.items()]
             for thread in threads:
@@ -85,6 +102,62 @@ def test_three_launchers_give_the_bytes_of_one(tmp_path: Path) -> None:
         digest = (folder / f"{name}.digest").read_text()
         assert digest == (tmp_path / "local" / f"{name}.digest").read_text()
         assert read_manifest(folder)["status"] == "incomplete"
+
+
+@pytest.mark.helics
+def test_sides_with_one_key_run_as_without(tmp_path: Path) -> None:
+    """If not, nobody would use a key: HELICS's own is derived from it on each side."""
+    sides = Sides(tmp_path, planned(tmp_path / "plan"), broker=KEY, grid=KEY, network=KEY)
+    sides.run()
+    assert sides.raised == {}
+    for name, folder in sides.folders.items():
+        assert (folder / f"{name}.digest").is_file()
+    # What is kept of the run must not give the key away.
+    for path in tmp_path.rglob("*"):
+        assert path.is_dir() or KEY.encode() not in path.read_bytes(), path
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"broker": KEY, "grid": KEY[::-1]}, "has not the key given here"),
+        ({"broker": KEY}, "it has no key, and the broker asks for one"),
+        ({"grid": KEY}, "it has a key, and the broker has none"),
+    ],
+)
+def test_who_has_another_key_does_not_come_in(
+    keys: dict[str, str], words: str, tmp_path: Path
+) -> None:
+    """If not, whoever reaches the port could feed measurements of their own into the run."""
+    sides = Sides(tmp_path, planned(tmp_path / "plan"), **keys)
+    sides.folders = {"grid": tmp_path / "grid"}
+    sides.wait_s = 1.0
+    sides.run()
+    assert words in str(sides.raised["grid"])
+    assert "did not come" in str(sides.raised["broker"])
+    assert not (tmp_path / "grid").exists()
+
+
+def test_a_key_that_others_may_know_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """If not, a broker open to the network would be as good as without a key."""
+    path = tmp_path / "key"
+    path.write_text(f"{KEY}\n")
+    path.chmod(0o644)
+    with pytest.raises(InputError, match="chmod 600"):
+        given_key(path)
+    path.chmod(0o600)
+    assert given_key(path) == KEY
+    monkeypatch.setenv(KEY_VARIABLE, "short")
+    with pytest.raises(InputError, match="at least 16"):
+        given_key(None)
+    monkeypatch.delenv(KEY_VARIABLE)
+    assert given_key(None) is None
+    with pytest.raises(InputError, match="needs a key"):
+        check_key("192.0.2.1", None)
+    check_key("192.0.2.1", KEY)
+    check_key("127.0.0.1", None)
 
 
 @pytest.mark.helics

@@ -1,4 +1,4 @@
-"""A federate that pauses at random: `python pausing.py SEED grid|network RUN.json`."""
+"""Federates that pause at random: `python pausing.py SEED grid|network|together RUN.json`."""
 
 import random
 import sys
@@ -7,8 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from tieline.cosim import together
 from tieline.cosim.federate import main
-from tieline.cosim.interfaces import GRID, Participant
+from tieline.cosim.interfaces import FEDERATES, GRID, Participant
 from tieline.grid.federate import open_participant as open_grid
 from tieline.network.federate import open_participant as open_network
 
@@ -45,4 +46,7 @@ def opener(role: str, seed: int) -> Callable[[dict[str, Any], Path], Participant
 
 if __name__ == "__main__":
     seed, role = int(sys.argv.pop(1)), sys.argv.pop(1)
-    main(role, opener(role, seed))
+    if role in FEDERATES:
+        main(role, opener(role, seed))
+    else:
+        together.main({name: opener(name, seed + i) for i, name in enumerate(FEDERATES)})

@@ -24,6 +24,13 @@ Wait = Annotated[str, typer.Option(metavar="TIME", help="longest wait until all 
 AllowRemote = Annotated[
     bool, typer.Option("--allow-remote", help="let an address be one that other hosts can reach")
 ]
+KeyFile = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="file with the broker's key, for your eyes alone; else TIELINE_BROKER_KEY",
+    ),
+]
 Target = Annotated[Path, typer.Option(metavar="DIR", help="the result folder, new or empty")]
 
 
@@ -68,20 +75,30 @@ def broker(
     port: Port = PORT,
     wait: Wait = "10 min",
     allow_remote: AllowRemote = False,
+    key_file: KeyFile = None,
     settings: Settings = None,
     debug: Debug = False,
 ) -> None:
     """Be the broker of a run whose federates are on other hosts."""
     from tieline.experiment.export import single_run
-    from tieline.experiment.hosts import check_address, serve
+    from tieline.experiment.hosts import check_address, is_loopback, serve
+    from tieline.experiment.keys import KEY_VARIABLE, given_key, new_key
     from tieline.experiment.progress import shown_progress
 
     with reporting(debug):
         check_address(host, allow_remote)
         plan = planned(reference, settings or [])
         run = single_run(plan, "broker")
+        key = given_key(key_file)
+        if key is None and not is_loopback(host):
+            key = new_key()
+            say(
+                f"the key of this run, shown once: {key}\n"
+                f"on the other hosts, before tieline join: read -rs {KEY_VARIABLE};"
+                f" export {KEY_VARIABLE}"
+            )
         with shown_progress(plan.study.points, console_of()) as listener:
-            outcome = serve(run, host, port, _seconds(wait), say, _of_grid(run, listener))
+            outcome = serve(run, host, port, _seconds(wait), say, _of_grid(run, listener), key)
         say(f"both federates reached the end, in {sum(outcome.wall_s.values()):.1f} s")
 
 
@@ -92,6 +109,7 @@ def join(
     out: Annotated[Path, typer.Option(metavar="DIR", help="folder for its tables, new or empty")],
     wait: Wait = "10 min",
     allow_remote: AllowRemote = False,
+    key_file: KeyFile = None,
     settings: Settings = None,
     debug: Debug = False,
 ) -> None:
@@ -100,6 +118,7 @@ def join(
     from tieline.experiment.export import single_run
     from tieline.experiment.hosts import check_address
     from tieline.experiment.hosts import join as join_run
+    from tieline.experiment.keys import given_key
 
     with reporting(debug):
         host, port = _address(broker)
@@ -107,7 +126,8 @@ def join(
         if federate not in FEDERATES:
             raise InputError(f"--federate must be grid or network (got {federate!r})")
         run = single_run(planned(reference, settings or []), "join")
-        join_run(run, federate, (host, port), out, _seconds(wait), say)
+        key = given_key(key_file)
+        join_run(run, federate, (host, port), out, _seconds(wait), say, key=key)
         say(f"the {federate} reached the end; its tables are in {out}")
 
 

@@ -1,7 +1,7 @@
 """Lines of JSON between the hosts of one run: who may join, how it goes, and why it ends.
 
-They go over one TCP connection a side, to the port beside HELICS's. They are neither encrypted nor
-authenticated, no more than HELICS's own: `FORMAT` gives a later release room to ask for a key.
+They go over one TCP connection a side, to the port beside HELICS's. They are not encrypted, no more
+than HELICS's own. With a key each side proves to the other that it has it before anything starts.
 """
 
 import collections
@@ -147,7 +147,7 @@ def refusal(own: Message, theirs: Message) -> str | None:
         return f"another way of joining: {theirs.get('format')!r} here is {own['format']!r}"
     words = [
         f"{name} {_short(theirs.get(name))} there, {_short(own.get(name))} at the broker"
-        for name in sorted({*own, *theirs} - {"format", "federate"})
+        for name in sorted({*own, *theirs} - {"format", "federate", "nonce"})
         if own.get(name) != theirs.get(name)
     ]
     if words:

@@ -10,9 +10,11 @@ from pathlib import Path
 from tieline.cosim.interfaces import FEDERATES, FederationSettings
 from tieline.cosim.runfile import federation_of
 from tieline.errors import CosimError, InputError
-from tieline.experiment.desk import Message, Wire, connect, hello, listen, refusal
+from tieline.experiment.desk import Message, Wire, connect, listen
+from tieline.experiment.door import Door, introduce
 from tieline.experiment.export import check_empty, lay_out
 from tieline.experiment.interrupts import interruptible
+from tieline.experiment.keys import KEY_VARIABLE
 from tieline.experiment.launch import (
     BROKER,
     COMMANDS,
@@ -25,17 +27,10 @@ from tieline.experiment.watch import Progress, Suspect, Watch
 
 Say = Callable[[str], None]
 
-_HELLO_S = 2.0
-"""Who connects says hello at once; meanwhile those who have joined hear nothing."""
-_ANSWER_S = 5.0
 _OVER_S = 3600.0
 """The other side may have much to write; a broker that dies is noticed at once all the same."""
 _PATIENCE = 20.0
 """How much longer a single federate waits than the broker, which hears both and ends a run."""
-
-
-class RefusedError(InputError):
-    """The broker runs another experiment, or another release."""
 
 
 def check_address(host: str, allow_remote: bool) -> None:
@@ -46,10 +41,28 @@ def check_address(host: str, allow_remote: bool) -> None:
     """
     if host in ("", "0.0.0.0", "::"):
         raise InputError(f"{host or 'nothing'} is no address at which other hosts reach this one")
-    if not (host == "localhost" or host.startswith("127.")) and not allow_remote:
+    if not is_loopback(host) and not allow_remote:
         raise InputError(
-            f"{host} is not this computer alone: neither HELICS nor tieline asks who connects, so"
-            " give --allow-remote only in a network where you trust everybody"
+            f"{host} is not this computer alone: nothing that HELICS or tieline sends there is"
+            " encrypted, so give --allow-remote only in a network that you trust, or in a tunnel"
+        )
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether only this computer reaches an address."""
+    return host == "localhost" or host.startswith("127.")
+
+
+def check_key(host: str, key: str | None) -> None:
+    """Refuse an address that others can reach without a key.
+
+    Raises:
+        InputError: it is one, and there is none.
+    """
+    if key is None and not is_loopback(host):
+        raise InputError(
+            f"a broker at {host} needs a key: set {KEY_VARIABLE} or give --key-file, with what"
+            " `tieline broker` shows when it makes one"
         )
 
 
@@ -60,6 +73,7 @@ def serve(
     wait_s: float,
     say: Say,
     on_progress: Callable[[Progress], None] | None = None,
+    key: str | None = None,
 ) -> Outcome:
     """Run the broker of one run, and return how it went once every federate has left.
 
@@ -70,15 +84,18 @@ def serve(
         wait_s: longest wait until all have come.
         say: is told who comes.
         on_progress: is told how far they are.
+        key: what federates must have; may be None on this computer alone.
 
     Raises:
-        InputError: it cannot listen there, or the core is none for several processes.
+        InputError: there is no key, it cannot listen there, or the core is not for processes.
         CosimError: not all came in time.
         FederateFailedError: a federate or the broker died, failed or hung.
     """
     settings = _settings(planned)
+    check_key(host, key)
+    door = Door(planned, key, say)
     with interruptible(), ExitStack() as stack:
-        wires = _admit(planned, host, port, wait_s, say)
+        wires = _admit(door, host, port, wait_s, say)
         for wire in wires.values():
             stack.callback(wire.close)
         remotes = [Remote(name, wires[name]) for name in FEDERATES]
@@ -89,6 +106,7 @@ def serve(
             on_progress,
             remotes=remotes,
             on_fault=lambda at_fault: _tell_all(remotes, {"end": _sentence(at_fault)}),
+            key=door.helics_key,
         )
         _tell_all(remotes, {"go": port + 1})
         place = [settings.core, str(port + 1), f"--host={host}"]
@@ -105,6 +123,7 @@ def join(
     wait_s: float,
     say: Say,
     commands: Mapping[str, Sequence[str]] = COMMANDS,
+    key: str | None = None,
 ) -> Outcome:
     """Run one federate of a run whose broker is elsewhere, and return how it went.
 
@@ -116,17 +135,20 @@ def join(
         wait_s: longest wait for the broker and for the others.
         say: is told what is waited for.
         commands: what starts a federate.
+        key: the broker's; may be None on this computer alone.
 
     Raises:
         InputError: the folder is not empty.
-        RefusedError: the broker runs something else; the message names both.
+        RefusedError: the broker runs something else, which the message names, or has another key.
         CosimError: there is no broker.
         FederateFailedError: this federate, the broker or another one failed.
     """
     settings = _settings(planned)
+    check_key(broker[0], key)
     check_empty(folder)
     with interruptible(), closing(connect(*broker, wait_s)) as wire:
-        port = _knock(wire, planned, federate, wait_s, say)
+        helics_key = introduce(wire, planned, federate, key)
+        port = _await_others(wire, federate, wait_s, say)
         place = {"broker_host": wire.other_address, "interface": wire.own_address}
         lay_out(planned, folder, broker_port=port, **place)
         uplink = Uplink(wire)
@@ -137,6 +159,7 @@ def join(
             remotes=[uplink],
             on_fault=uplink.end,
             on_word=uplink.hear,
+            key=helics_key,
             name=f"launcher_of_{federate}",
         )
         outcome = processes.run([(federate, [*commands[federate], str(folder / "run.json")])])
@@ -162,7 +185,7 @@ def _settings(planned: PlannedRun) -> FederationSettings:
     return settings
 
 
-def _admit(planned: PlannedRun, host: str, port: int, wait_s: float, say: Say) -> dict[str, Wire]:
+def _admit(door: Door, host: str, port: int, wait_s: float, say: Say) -> dict[str, Wire]:
     """Return a connection to each federate, once all that may join have come."""
     wires: dict[str, Wire] = {}
     limit = time.monotonic() + wait_s
@@ -174,7 +197,7 @@ def _admit(planned: PlannedRun, host: str, port: int, wait_s: float, say: Say) -
                 raise CosimError(f"{missing} did not come in {wait_s:g} s")
             if select.select([listener], [], [], 0.2)[0]:
                 wire = Wire(listener.accept()[0])
-                name = _examined(wire, planned, wires, say)
+                name = door.examined(wire, wires)
                 if name is not None:
                     wires[name] = wire
             for name in [name for name, wire in wires.items() if not _is_there(wire)]:
@@ -190,36 +213,8 @@ def _is_there(wire: Wire) -> bool:
     return wire.lost is None
 
 
-def _examined(wire: Wire, planned: PlannedRun, wires: dict[str, Wire], say: Say) -> str | None:
-    """Return the name of a federate that may join; answer it either way."""
-    try:
-        theirs = wire.wait(_HELLO_S)
-    except CosimError as error:
-        say(f"somebody at {wire.other_address} said nothing: {error}")
-        wire.close()
-        return None
-    name = str(theirs.get("federate"))
-    reason = refusal(hello(planned, name), theirs)
-    if name not in FEDERATES:
-        reason = f"there is no federate {name!r}"
-    elif name in wires:
-        reason = f"the {name} has joined already, from {wires[name].other_address}"
-    if reason is not None:
-        say(f"refused {wire.other_address}: {reason}")
-        wire.send({"refused": reason})
-        wire.close()
-        return None
-    say(f"{name} comes from {wire.other_address}")
-    wire.send({"accepted": name})
-    return name
-
-
-def _knock(wire: Wire, planned: PlannedRun, federate: str, wait_s: float, say: Say) -> int:
+def _await_others(wire: Wire, federate: str, wait_s: float, say: Say) -> int:
     """Return HELICS's port at the broker, once everybody has come."""
-    wire.send(hello(planned, federate))
-    answer = wire.wait(_ANSWER_S)
-    if "refused" in answer:
-        raise RefusedError(f"the broker at {wire.other_address} refused: {answer['refused']}")
     say(f"{federate} joined the broker at {wire.other_address}, and waits for the others")
     answer = wire.wait(wait_s)
     if "go" not in answer:

@@ -19,6 +19,7 @@ from tieline.errors import CosimError, TielineError
 from tieline.experiment.folder import write_json
 from tieline.experiment.guests import GuestProcess, guest_processes
 from tieline.experiment.interrupts import current_interrupts, interruptible
+from tieline.experiment.keys import keyed, new_key
 from tieline.experiment.remote import Remote
 from tieline.experiment.run_logs import RunLogs
 from tieline.experiment.strays import end_strays
@@ -116,7 +117,8 @@ def launch(
             broker = [*table[BROKER], settings.core, str(port), members]
             starts = [(BROKER, broker), *((name, [*table[name], str(run_file)]) for name in order)]
         guests = guest_processes(run, folder)
-        processes = Processes(folder, Watch(settings), on_progress, guests, start=start)
+        watch, key = Watch(settings), new_key()
+        processes = Processes(folder, watch, on_progress, guests, start=start, key=key)
         return processes.run(starts, stagger_s)
 
 
@@ -132,6 +134,7 @@ class Processes:
         on_fault: told who is at fault, or that the user is, before everything is ended.
         on_word: given every word as it came.
         start: how a federate or the broker comes to be.
+        key: HELICS's, without which nobody joins; None asks for none.
         name: of this launcher's own log.
     """
 
@@ -146,6 +149,7 @@ class Processes:
         on_fault: Callable[[Suspect], None] | None = None,
         on_word: Callable[[Mapping[str, Any]], None] | None = None,
         start: Start = executed,
+        key: str | None = None,
         name: str = "launcher",
     ) -> None:
         self._folder = folder
@@ -157,6 +161,7 @@ class Processes:
         self._on_fault = on_fault
         self._on_word = on_word
         self._start_process = start
+        self._key = key
         self._interrupts = current_interrupts()
         self._children: dict[str, Child | Remote] = {remote.name: remote for remote in remotes}
         self._marks: dict[str, float] = {}
@@ -193,7 +198,8 @@ class Processes:
     ) -> None:
         try:
             log = self._logs.of(name)
-            child = Child(name, command, log, start, has_word, self._folder)
+            keyed_start = keyed(start, self._key)
+            child = Child(name, command, log, keyed_start, has_word, self._folder)
         except OSError as error:
             self._fail(Suspect(name, f"could not be started: {error}", CosimError.exit_code))
         self._children[name] = child

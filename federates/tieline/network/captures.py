@@ -1,6 +1,7 @@
 """Writes what chosen links carry as capture files, as a run goes."""
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +16,24 @@ from tieline.network.pcap import (
     hosts_text,
     stream_configurations,
 )
-from tieline.network.spec import FRAME_BYTES, NetworkSpec
+from tieline.network.spec import FRAME_BYTES, Link, NetworkSpec
 
 PayloadOf = Callable[[NDArray[np.int64], NDArray[np.int64]], NDArray[np.uint8]]
+
+
+_NO_NAME = re.compile(r"[^A-Za-z0-9_.+-]")
+"""What no file's name holds: a node may be called anything, also `../x`."""
+
+
+def capture_names(links: Sequence[Link], taps: Iterable[int]) -> dict[int, str]:
+    """Return the file `A-B.pcap` of each tapped link, by the link's number; no two are alike."""
+    names: dict[int, str] = {}
+    for number in taps:
+        ends = (_NO_NAME.sub("_", node) for node in (links[number].a, links[number].b))
+        name = "-".join(ends).lstrip(".")
+        is_free = f"{name}.pcap" not in names.values()
+        names[number] = f"{name}.pcap" if is_free else f"{name}.{number}.pcap"
+    return names
 
 
 class Captures:
@@ -49,9 +65,8 @@ class Captures:
         configurations = stream_configurations(spec, numbers, f0_hz, rate_hz)
         (folder / "hosts").write_text(hosts_text(spec, plan), encoding="utf-8")
         self._captures = {}
-        for number in spec.taps:
-            link = spec.links[number]
-            path = folder / f"{link.a}-{link.b}.pcap"
+        for number, name in capture_names(spec.links, spec.taps).items():
+            path = folder / name
             self._captures[number] = Capture(path, spec, plan, number, configurations)
 
     def add(self, until_ns: int, payload_of: PayloadOf) -> None:
