@@ -18,6 +18,7 @@ import numpy as np
 from tieline.cosim import wire
 from tieline.cosim.interfaces import GRID, NETWORK
 from tieline.cosim.together import main as main_together
+from tieline.tables import Column, TableStream
 
 COMMANDS = {
     name: (sys.executable, str(Path(__file__).resolve()), name)
@@ -28,7 +29,8 @@ COMMANDS = {
 class Dummy:
     """A participant whose messages are pseudo-random bytes made from what it has received.
 
-    It leaves `NAME.digest` when it finishes and `NAME.aborted` when it is told to abort.
+    It leaves `NAME.digest` when it finishes and `NAME.aborted` when it is told to abort. One that
+    records leaves `NAME.parquet`, with a row an interval.
     """
 
     def __init__(self, name: str, folder: Path, options: dict[str, Any], lead: int = 0) -> None:
@@ -38,6 +40,10 @@ class Dummy:
         self._options = options
         self._digest = hashlib.sha256(name.encode()).digest()
         self._pauses = random.Random(options.get("pause_seed", 0))
+        self._table: TableStream | None = None
+        if options.get("records"):
+            path = folder / f"{name}.parquet"
+            self._table = TableStream(path, [Column("t_s", "s", "simulated time")])
 
     def start(self) -> list[bytes]:
         """Return the first messages: one of the grid, of the network as many as it leads by."""
@@ -50,16 +56,25 @@ class Dummy:
             self._err(self._options["fault"])
         if "pause_s" in self._options:
             time.sleep(self._pauses.random() * self._options["pause_s"])
+        if self._table is not None:
+            self._table.append({"t_s": np.array([k / 60])})
+            self._table.flush()
         return self._message()
 
     def finish(self) -> None:
         """Write down what was received, and whether HELICS was there."""
         (self._folder / "helics").write_text(str("helics" in sys.modules))
         (self._folder / f"{self.name}.digest").write_text(self._digest.hex())
+        self._close()
 
     def abort(self, reason: str) -> None:
         """Write down why it had to stop."""
         (self._folder / f"{self.name}.aborted").write_text(reason)
+        self._close()
+
+    def _close(self) -> None:
+        if self._table is not None:
+            self._table.close()
 
     def _message(self) -> bytes:
         draw = np.random.default_rng(list(self._digest))

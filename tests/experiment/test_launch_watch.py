@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import pytest
 
 from tieline.cosim.interfaces import FederationSettings
-from tieline.experiment.watch import Progress, Suspect, Watch
+from tieline.experiment.watch import LONG_S, PATIENCE, Effort, Progress, Suspect, Watch
 
 
 @dataclass
@@ -15,10 +15,17 @@ class FakeProcess:
     exit_code: int | None = None
     is_held: bool = False
     reason: str | None = None
+    works: bool | None = None
+    """None: the kernel does not tell."""
+    passed_s: float = 0.0
 
     def is_stopped(self) -> bool:
         """Return whether it is held."""
         return self.is_held
+
+    def effort(self) -> Effort | None:
+        """Return processor time for as long as it is said to have worked."""
+        return None if self.works is None else Effort(self.works * self.passed_s, 0)
 
 
 def processes(**changed: FakeProcess) -> dict[str, FakeProcess]:
@@ -44,6 +51,19 @@ def let_pass(watch: Watch, seconds: float) -> None:
     """Let wall time pass in small steps."""
     for _ in range(round(seconds / 0.1)):
         watch.pass_time(0.1)
+
+
+def silence(watch: Watch, works: bool, seconds: float) -> Suspect | None:
+    """Return who is suspected first in a silence in which the federates' processes work, or not."""
+    all_three = {name: FakeProcess(works=works) for name in ("broker", "grid", "network")}
+    for _ in range(round(seconds / 0.1)):
+        watch.pass_time(0.1)
+        for process in all_three.values():
+            process.passed_s += 0.1
+        suspect = watch.suspect(all_three)
+        if suspect is not None:
+            return suspect
+    return None
 
 
 def failed(federate: str, fault: str) -> dict[str, object]:
@@ -154,6 +174,69 @@ def test_a_launcher_that_was_held_itself_does_not_blame_the_federates() -> None:
     watch = watch_of(word("grid"), word("network"))
     watch.pass_time(3600.0)
     assert watch.suspect(processes()) is None
+
+
+def met_after(seconds: float) -> Watch:
+    """Return a watch of a run of which one meeting took so long."""
+    watch = watch_of(word("grid"), word("network"))
+    let_pass(watch, seconds)
+    watch.hear(word("grid", k=6))
+    return watch
+
+
+def test_a_run_whose_meetings_take_long_is_given_longer_while_it_works() -> None:
+    """If not, a large network would be ended in the middle of honest work."""
+    watch = met_after(1.9)
+    suspect = silence(watch, True, 20.0)
+    assert "no federate was granted anything for 9.5 s" in str(suspect)
+    assert watch.silence_s == pytest.approx(1.9 * PATIENCE, abs=0.2)
+
+
+def test_a_run_whose_meetings_are_short_is_given_no_more_than_the_limit() -> None:
+    """If not, an endless loop in a federate would hold a run for minutes."""
+    assert silence(met_after(0.2), True, 1.9) is None
+    assert silence(met_after(0.2), True, 2.3) is not None
+
+
+def test_a_run_in_which_nobody_works_is_given_the_limit_whatever_it_was_like() -> None:
+    """If not, a federation that waits for itself would hold a run whose meetings take long."""
+    suspect = silence(met_after(1.9), False, 2.5)
+    assert suspect is not None
+    assert "for 2 s of wall time, and no process worked" in suspect.reason
+
+
+@pytest.mark.parametrize(("state", "k"), [("running", 0), ("finishing", 9)])
+def test_work_that_nobody_hears_of_counts_where_there_is_no_meeting_to_learn_from(
+    state: str, k: int
+) -> None:
+    """If not, compiled code that lets no other thread speak would end a good run."""
+    words = [word(name, state, k=k) for name in ("grid", "network")]
+    assert silence(watch_of(*words), True, 20.0) is None
+    assert LONG_S > 20.0
+    assert silence(watch_of(*words), False, 2.5) is not None
+
+
+def test_a_start_in_which_nobody_works_is_over_soon() -> None:
+    """If not, a federate that never starts would be waited for as long as one that compiles."""
+    words = (word("grid", "joining", k=-1), word("network", "opening", k=-1))
+    suspect = silence(watch_of(*words), False, 2.5)
+    assert suspect is not None
+    assert suspect.name == "network"
+
+
+def test_a_stopped_process_is_named_before_the_limit_of_a_long_run() -> None:
+    """If not, a run with long meetings would wait for a process that cannot work."""
+    watch = Watch(FederationSettings(hang_timeout=60.0))
+    let_pass(watch, 3.2)
+    assert named(watch.suspect(processes(broker=FakeProcess(is_held=True)))) == "broker"
+
+
+def test_a_process_without_grants_of_its_own_is_told_with_those_of_the_others() -> None:
+    """If not, nobody would know how far a run came whose broker died."""
+    watch = watch_of(word("grid"), word("network", granted_ns=1))
+    suspect = watch.suspect(processes(broker=FakeProcess(-9)))
+    assert suspect is not None
+    assert suspect.reason == "died: killed by SIGKILL (last granted 0.083335 s to the others)"
 
 
 def test_a_federates_word_is_progress_and_the_brokers_is_not() -> None:

@@ -28,6 +28,8 @@ from tieline.tables import read_whole
 
 END_WITHIN_S = 10.0
 CLEAN_WITHIN_S = 2.0
+"""Both where a core is free: on a busy machine, as many times longer as there are processes that
+want to run on each core."""
 PATIENCE_S = 200.0
 START_S = 120.0
 BLOCK = 100
@@ -101,16 +103,20 @@ class Finding:
     status: str = ""
     reason: str = ""
     last_valid_s: float | None = None
+    busy: float = 1.0
     broken: list[str] = field(default_factory=list)
 
 
-def harm(trial: Trial, command: Sequence[str], folder: Path) -> Finding:
+def harm(
+    trial: Trial, command: Sequence[str], folder: Path, end_within_s: float = END_WITHIN_S
+) -> Finding:
     """Return what came of a trial.
 
     Args:
         trial: the harm.
         command: starts a run whose result folder is `out` in `folder`, the working directory.
         folder: empty, or with what the command needs and an earlier result.
+        end_within_s: longest time from the fault to the end.
     """
     run = _Run(command, folder)
     finding = Finding(trial)
@@ -121,6 +127,8 @@ def harm(trial: Trial, command: Sequence[str], folder: Path) -> Finding:
         begin_s = time.monotonic()
         _inflict(run, trial)
         _await_end(run, trial, finding, begin_s)
+        if finding.end_s > end_within_s * finding.busy and not run.is_whole():
+            finding.broken.append(f"it took {finding.end_s:.1f} s to end")
         finding.broken += _look(run, trial, finding)
     except TimeoutError as error:
         finding.broken.append(str(error))
@@ -166,6 +174,11 @@ class _Run:
     def work(self) -> Path | None:
         """Return the folder that the run is written in, None before and after."""
         return next(iter(self.folder.glob(".out.partial-*")), None)
+
+    def is_whole(self) -> bool:
+        """Return whether the new result has its place."""
+        manifest = _read(self.out / "manifest.json")
+        return manifest.get("status") == "complete" and manifest["label"] != "older"
 
     def note_ports(self) -> None:
         """Remember which ports the run has reserved."""
@@ -290,18 +303,23 @@ def fill(folder: Path) -> None:
 def _await_end(run: _Run, trial: Trial, finding: Finding, begin_s: float) -> None:
     def is_over() -> bool:
         # The launcher's own death is no end: what it leaves must end, too.
-        is_dead = not run.is_alive()
-        return is_dead and not (trial.victim == "launcher" and run.processes())
+        if run.is_alive():
+            # All that is left is to draw, which the fault could not hinder any more.
+            return trial.victim != "launcher" and run.is_whole()
+        return not (trial.victim == "launcher" and run.processes())
 
     _await("the end", is_over, PATIENCE_S)
     finding.end_s = time.monotonic() - begin_s
     finding.exit_code = run.launcher.returncode
+    finding.busy = max(1.0, os.getloadavg()[0] / len(os.sched_getaffinity(0)))
+    if run.is_alive():
+        run.clear()
 
     def is_clean() -> bool:
         return not (run.processes() or run.listening() or run.leftovers())
 
     with suppress(TimeoutError):
-        _await("a clean end", is_clean, CLEAN_WITHIN_S)
+        _await("a clean end", is_clean, CLEAN_WITHIN_S * finding.busy)
     finding.clean_s = time.monotonic() - begin_s - finding.end_s
 
 
@@ -313,7 +331,7 @@ def _look(run: _Run, trial: Trial, finding: Finding) -> Iterator[str]:
     ):
         if left:
             yield f"{what} are left: {left}"
-    if "Traceback" in run.said:
+    if any(line.startswith("Traceback") for line in run.said.splitlines()):
         yield f"it showed a traceback: {run.said[-600:]}"
     yield from _look_at_result(run, trial, finding)
 
@@ -339,8 +357,6 @@ def _look_at_result(run: _Run, trial: Trial, finding: Finding) -> Iterator[str]:
             yield "it said that all went well, and the older result is still there"
         yield from whole(folder, trial)
         return
-    if finding.end_s > END_WITHIN_S:
-        yield f"it took {finding.end_s:.1f} s to end"
     if finding.exit_code == 0:
         yield "the exit code is 0, and the result is not complete"
     yield from _words(run, trial, finding, manifest)

@@ -104,26 +104,32 @@ def made_older(folder: Path) -> Path:
     text = EXPERIMENT.format(duration_s=SHORT_S, core="zmq")
     (folder / "older.yaml").write_text(text)
     command = [sys.executable, str(ROOT / "runner.py"), "run", "older.yaml", "--out", "older"]
-    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    done = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True)
+    if done.returncode:
+        raise SystemExit(f"a run that nobody harms fails here: {done.stderr}")
     manifest = json.loads((folder / "older" / "manifest.json").read_text())
     (folder / "older" / "manifest.json").write_text(json.dumps(manifest | {"label": "older"}))
     return folder / "older"
 
 
 def table(findings: Sequence[Finding]) -> str:
-    """Return the table of what was found, a row for each kind of fault."""
+    """Return the table of what was found, a row for each kind of fault.
+
+    `busy` is how many processes of all users wanted to run on each core, on average.
+    """
     kinds = collections.defaultdict(list)
     for finding in findings:
         kinds[finding.trial.kind].append(finding)
-    rows = ["| fault | trials | worst to end, s | median, s | worst to clean, s | held |"]
-    rows.append("|---|---|---|---|---|---|")
+    rows = ["| fault | trials | worst to end, s | median, s | worst to clean, s | busy | held |"]
+    rows.append("|---|---|---|---|---|---|---|")
     for kind, found in [*sorted(kinds.items()), ("all", list(findings))]:
         # A run that was whole already goes on to its plots.
         ends = [one.end_s for one in found if one.status != "complete"] or [0.0]
         held = sum(not one.broken for one in found)
         rows.append(
             f"| {kind} | {len(found)} | {max(ends):.1f} | {statistics.median(ends):.1f} |"
-            f" {max(one.clean_s for one in found):.1f} | {held} of {len(found)} |"
+            f" {max(one.clean_s for one in found):.1f} |"
+            f" {statistics.mean(one.busy for one in found):.1f} | {held} of {len(found)} |"
         )
     return "\n".join(rows)
 
@@ -152,18 +158,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         findings = _all(Path(name), arguments, with_disk)
     say(table(findings))
     say(f"{len(findings)} trials in {time.monotonic() - begin_s:.0f} s of wall time")
-    if arguments.json is not None:
-        arguments.json.write_text(json.dumps([asdict(one) for one in findings], indent=2) + "\n")
     return 1 if any(one.broken for one in findings) else 0
 
 
 def _all(folder: Path, arguments: argparse.Namespace, with_disk: bool) -> list[Finding]:
     older = made_older(folder)
+    done: list[Finding] = []
 
     def one(number: int) -> Finding:
         trial = drawn(number, arguments.seed, with_disk)
         finding = attempt(trial, folder / f"trial-{number}", older)
         verdict = "; ".join(finding.broken) or "held"
+        done.append(finding)
+        if arguments.json is not None:
+            text = json.dumps([asdict(one) for one in done], indent=2)
+            arguments.json.write_text(text + "\n", encoding="utf-8")
         say(
             f"{number}: {trial.kind}, {trial.phase} + {trial.after_s:.2f} s, {trial.core}:"
             f" {finding.end_s:.1f} s, exit code {finding.exit_code}, {finding.status}"

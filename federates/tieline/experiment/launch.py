@@ -40,9 +40,9 @@ COMMANDS: Mapping[str, Sequence[str]] = {
 _POLL_S = 0.1
 _SETTLE_S = 0.6
 _LINGER_S = 2.0
-_END_WITHIN_S = 8.2
+_END_WITHIN_S = 7.5
 _LEAST_GRACE_S = 1.0
-_MOST_GRACE_S = 5.0
+_MOST_GRACE_S = 3.0
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ PATIENCE_FIRST = 2.0
 LONG_S = 600.0
 """The same, where a federate may rightly work for long before there is a meeting to learn from."""
 
+_FIRST_LOOK = 0.4
 _WORKING_SHARE = 0.05
 _LONGEST_PASS_S = 0.5
 _LEAST_CPU_S = 0.05
@@ -167,9 +168,9 @@ class Watch:
         self._works_on = None
 
     def _look_for_work(self, processes: Mapping[str, Process]) -> None:
-        """Compare what the federates' processes do in the second half of a silence."""
-        half_s = self._settings.hang_timeout / 2
-        if self.silence_s < half_s:
+        """Compare what the federates' processes have done over half the limit, before it is up."""
+        limit_s = self._settings.hang_timeout
+        if self.silence_s < _FIRST_LOOK * limit_s:
             return
         now = {
             name: effort
@@ -181,7 +182,7 @@ class Watch:
             return
         since_s, before = self._efforts
         elapsed_s = self.silence_s - since_s
-        if elapsed_s < half_s:
+        if elapsed_s < limit_s / 2:
             return
         works = any(
             now[name].cpu_s - before[name].cpu_s >= _WORKING_SHARE * elapsed_s

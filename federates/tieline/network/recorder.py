@@ -13,6 +13,7 @@ from tieline.network.series import ControllerSeries, LinkSeries
 from tieline.network.spec import NetworkSpec, least_delay_ns
 from tieline.network.stats import FlowStatistics
 from tieline.network.streams_used import STREAMS, write_streams
+from tieline.units import NS_PER_S
 
 
 class Recorder:
@@ -52,6 +53,7 @@ class Recorder:
         self._window_ns = window_ns
         self._windows = 0
         self._until_ns = 0
+        self._flushed_ns = 0
         if window_ns is not None:
             self._links = LinkSeries(folder / "link_series.parquet", engine)
             path = folder / "controller_series.parquet"
@@ -90,6 +92,8 @@ class Recorder:
             self._controllers.add(arrivals["destination"], arrived.delays_ns, drops)
             if until_ns == (self._windows + 1) * self._window_ns:
                 self._close_window(self._window_ns)
+        if until_ns - self._flushed_ns >= NS_PER_S:
+            self._flush()
 
     def write(self) -> None:
         """Write the tables as far as the run came; the last window may be a shorter one.
@@ -116,3 +120,12 @@ class Recorder:
         self._links.close_window(self._until_ns, length_ns)
         self._controllers.close_window(self._until_ns, self._age.measured_ns)
         self._windows += 1
+
+    def _flush(self) -> None:
+        """Keep the tables that grow abreast of the grid's, whoever is killed."""
+        self._flushed_ns = self._until_ns
+        if self._log is not None:
+            self._log.flush()
+        if self._window_ns is not None:
+            self._links.flush()
+            self._controllers.flush()

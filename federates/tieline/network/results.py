@@ -226,6 +226,10 @@ class PacketLog:
             }
         )
 
+    def flush(self) -> None:
+        """Hand what there is to the operating system, so that a kill loses nothing of it."""
+        self._stream.flush()
+
     def close(self) -> None:
         """Finish the file."""
         self._stream.close()

@@ -79,6 +79,10 @@ class LinkSeries:
             }
         )
 
+    def flush(self) -> None:
+        """Hand what there is to the operating system, so that a kill loses nothing of it."""
+        self._stream.flush()
+
     def close(self) -> None:
         """Finish the file."""
         self._stream.close()
@@ -140,6 +144,10 @@ class ControllerSeries:
         )
         self._keys.clear()
         self._lost[:] = 0
+
+    def flush(self) -> None:
+        """Hand what there is to the operating system, so that a kill loses nothing of it."""
+        self._stream.flush()
 
     def close(self) -> None:
         """Finish the file."""

@@ -16,6 +16,7 @@ import select
 import signal
 import tempfile
 import time
+import traceback
 import warnings
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -24,6 +25,7 @@ from typing import Any
 
 from tieline.cosim.local import run_local
 from tieline.cosim.process import LAUNCHER_VARIABLE, die_with_launcher, exit_code_of, reason_of
+from tieline.errors import TielineError
 from tieline.experiment.launch import launch
 from tieline.experiment.point import Task, run_task
 from tieline.experiment.watch import Progress
@@ -153,8 +155,21 @@ def _run_point(order: Mapping[str, Any]) -> None:
     except KeyboardInterrupt:
         raise SystemExit(_INTERRUPTED) from None
     except Exception as error:
+        if not isinstance(error, TielineError):
+            _keep_traceback(Path(task.folder) / "logs", error)
         _say({"id": order["id"], "error": reason_of(error)[:_LONGEST_ERROR]})
         raise SystemExit(exit_code_of(error)) from None
+
+
+def _keep_traceback(logs: Path, error: Exception) -> None:
+    """Write beside the point's logs where an unexpected error arose; its message is told."""
+    try:
+        logs.mkdir(exist_ok=True)
+        text = "".join(traceback.format_exception(error))
+        (logs / "launcher.log").write_text(text, encoding="utf-8")
+    except OSError:
+        # There is no result folder, or no room in it.
+        return
 
 
 def _launch(folder: Path, on_progress: Callable[[Progress], None]) -> Any:
