@@ -2,13 +2,14 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from tieline.errors import InputError
@@ -19,6 +20,9 @@ SUMMARY = "summary.json"
 POINTS = "points"
 MAP = "map.json"
 FORMAT = "tieline-result/1"
+
+_VALUES_AT_ONCE = 500_000
+_TEXTS_AT_ONCE = 10_000
 
 
 @dataclass(frozen=True)
@@ -149,16 +153,48 @@ def table_hash(path: Path) -> str:
     hashes. A null in a column of numbers counts as NaN.
     """
     digest = hashlib.sha256()
-    table = pq.read_table(path)
-    for name in table.column_names:
-        column = table.column(name)
-        digest.update(f"{name}\n{column.type}\n{len(column)}\n".encode())
-        values = column.to_numpy()
-        if values.dtype == object:
-            texts = [None if value is None else str(value) for value in values]
-            digest.update(json.dumps(texts).encode())
-            continue
+    with pq.ParquetFile(path) as table:
+        rows = table.metadata.num_rows
+        for field, parts in _columns(table):
+            digest.update(f"{field.name}\n{field.type}\n{rows}\n".encode())
+            if pa.types.is_string(field.type):
+                _hash_texts(digest, parts)
+            else:
+                _hash_numbers(digest, parts)
+    return digest.hexdigest()
+
+
+def _columns(table: pq.ParquetFile) -> Iterator[tuple[pa.Field, Iterable[pa.ChunkedArray]]]:
+    """Yield every column with its values in parts, few at a time: a table may exceed the memory."""
+    rows = table.metadata.num_rows
+    at_once = _VALUES_AT_ONCE // max(rows, 1)
+    if at_once == 0:
+        for field in table.schema_arrow:
+            groups = range(table.num_row_groups)
+            yield field, (table.read_row_group(g, [field.name]).column(0) for g in groups)
+        return
+    fields = list(table.schema_arrow)
+    for first in range(0, len(fields), at_once):
+        some = fields[first : first + at_once]
+        block = table.read([field.name for field in some])
+        for field in some:
+            yield field, [block.column(field.name)]
+
+
+def _hash_texts(digest: "hashlib._Hash", parts: Iterable[pa.ChunkedArray]) -> None:
+    """Take in texts as one JSON list of them all."""
+    between = "["
+    for chunk in (chunk for part in parts for chunk in part.chunks if len(chunk)):
+        for first in range(0, len(chunk), _TEXTS_AT_ONCE):
+            texts = chunk.slice(first, _TEXTS_AT_ONCE).to_pylist()
+            digest.update(f"{between}{json.dumps(texts)[1:-1]}".encode())
+            between = ", "
+    digest.update(b"[]" if between == "[" else b"]")
+
+
+def _hash_numbers(digest: "hashlib._Hash", parts: Iterable[pa.ChunkedArray]) -> None:
+    for part in parts:
+        values = part.to_numpy()
         if values.dtype.kind == "f":
             values = np.where(np.isnan(values), np.nan, values).astype(values.dtype)
         digest.update(values.astype(values.dtype.newbyteorder("<")).tobytes())
-    return digest.hexdigest()
