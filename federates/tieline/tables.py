@@ -6,6 +6,7 @@ unfinished Parquet file could not be read at all.
 """
 
 import errno
+import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,7 +28,9 @@ _SUFFIXES = (".parquet", _STREAM_SUFFIX)
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _VALUES_PER_BATCH = 131_072
 _MOST_ROWS_PER_BATCH = 32_768
-_VALUES_PER_ROW_GROUP = 250_000
+_LEAST_VALUES_PER_ROW_GROUP = 250_000
+_INDEX_OVER_VALUE = 87
+"""What the index of one column of a row group takes of memory, over what writing one value does."""
 
 
 @dataclass(frozen=True)
@@ -328,11 +331,12 @@ def _to_parquet(stream_path: Path, path: Path) -> bool:
         if reader is not None:
             # A dictionary of numbers that never repeat costs memory for nothing.
             texts = [field.name for field in reader.schema if field.type == pa.string()]
+            most = _values_per_row_group(stream_path.stat().st_size // 8, len(reader.schema))
             try:
                 with pq.ParquetWriter(
                     _part_of(path), reader.schema, compression="zstd", use_dictionary=texts
                 ) as writer:
-                    for group in _row_groups(reader):
+                    for group in _row_groups(reader, most):
                         writer.write_table(group)
             except OSError:
                 _part_of(path).unlink(missing_ok=True)
@@ -343,14 +347,23 @@ def _to_parquet(stream_path: Path, path: Path) -> bool:
     return reader is not None
 
 
-def _row_groups(reader: pa.RecordBatchReader) -> Iterator[pa.Table]:
+def _values_per_row_group(values: int, columns: int) -> int:
+    """Return how many values a row group has, for the least memory while they are written.
+
+    The index of a Parquet file is held until its end: it grows with the number of groups, and what
+    is held of the values with their length. The sum is least where both take the same.
+    """
+    return max(_LEAST_VALUES_PER_ROW_GROUP, math.isqrt(_INDEX_OVER_VALUE * values * columns))
+
+
+def _row_groups(reader: pa.RecordBatchReader, most: int) -> Iterator[pa.Table]:
     """Yield the rows in few large groups: a reader pays for each column of each group."""
     batches: list[pa.RecordBatch] = []
     values = 0
     for batch in _whole_batches(reader):
         batches.append(batch)
         values += batch.num_rows * batch.num_columns
-        if values >= _VALUES_PER_ROW_GROUP:
+        if values >= most:
             yield pa.Table.from_batches(batches)
             batches, values = [], 0
     if batches:

@@ -10,6 +10,7 @@ import os
 import random
 import sys
 import time
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -86,6 +87,8 @@ class Dummy:
             raise ValueError("the dummy was told to fail")
         if fault == "exit":
             os._exit(7)
+        if fault == "warn":
+            warnings.warn("the dummy was told to warn", RuntimeWarning, stacklevel=1)
         if fault == "hang":
             time.sleep(3600)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tieline.experiment.folder import FORMAT, MANIFEST, is_result, read_json, read_manifest
-from tieline.experiment.table_facts import table_hash
+from tieline.experiment.table_hash import table_hash
 from tieline.tables import column_names, read_table, stored
 
 if TYPE_CHECKING:

@@ -25,6 +25,7 @@ class RunLogs:
         self._own = self.of(name)
         self._words: dict[str, Mapping[str, Any]] = {}
         self._used: set[str] = set()
+        self._has_fault = False
 
     def of(self, name: str) -> Log:
         """Return a new log for a process."""
@@ -41,6 +42,7 @@ class RunLogs:
 
     def fault(self, suspect: Suspect) -> None:
         """Note who is at fault, and what all the federates were doing."""
+        self._has_fault = True
         text = f"{suspect.name}: {suspect.reason}"
         facts = {**asdict(suspect), "words": self._words}
         self._own.note("error", "fault", text, **facts)
@@ -59,7 +61,9 @@ class RunLogs:
         self._own.note("info", "end", "every federate reached the end")
 
     def failed(self, error: BaseException) -> None:
-        """Note what ended the run."""
+        """Note what ended the run, if that is not a fault that was noted."""
+        if self._has_fault:
+            return
         text = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
         first = text.splitlines()[0] if text else ""
         self._own.note("error", "failed", first, error=type(error).__name__, words=self._words)

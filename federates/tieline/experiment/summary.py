@@ -23,6 +23,9 @@ RING_DOWN_RATE_HZ = 20.0
 
 DEFAULT_BAND_HZ = (0.2, 0.8)
 
+_NEEDED = ("t_s", "coi_pu", "speed_pu.", "age_s.", "vt_pu.")
+"""How the columns of the grid's table begin that the summary looks at."""
+
 
 def summarise(run: Run) -> dict[str, Any]:
     """Return the summary of a run: plain numbers, None where there is nothing to tell.
@@ -30,7 +33,8 @@ def summarise(run: Run) -> dict[str, Any]:
     Raises:
         InputError: the run's files cannot be read.
     """
-    grid = run.table("grid")
+    # Not all of its columns: those of a long run take more memory than the run itself.
+    grid = run.table("grid", *(name for name in run.columns("grid") if name.startswith(_NEEDED)))
     told = run.told()
     return {
         "label": run.label,

@@ -1,13 +1,10 @@
 """What a manifest says of a result's tables: their content hashes, and how far they reach."""
 
-import hashlib
-import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from tieline.tables import last_value, read_whole, readable_tables
+from tieline.experiment.table_hash import table_hash
+from tieline.tables import last_value, readable_tables
 from tieline.units import NS_PER_S
 
 _GROWING = {
@@ -36,25 +33,3 @@ def table_facts(folder: Path) -> dict[str, Any]:
         "tables_until_s": until_s,
         "last_valid_s": min(until_s.values()) if "grid" in until_s else None,
     }
-
-
-def table_hash(path: Path) -> str:
-    """Return the SHA-256 of what a table says: names, types and values of its columns, in order.
-
-    Row groups, compression and metadata do not enter, so tables with equal content have equal
-    hashes. A null in a column of numbers counts as NaN.
-    """
-    digest = hashlib.sha256()
-    table = read_whole(path)
-    for name in table.column_names:
-        column = table.column(name)
-        digest.update(f"{name}\n{column.type}\n{len(column)}\n".encode())
-        values = column.to_numpy()
-        if values.dtype == object:
-            texts = [None if value is None else str(value) for value in values]
-            digest.update(json.dumps(texts).encode())
-            continue
-        if values.dtype.kind == "f":
-            values = np.where(np.isnan(values), np.nan, values).astype(values.dtype)
-        digest.update(values.astype(values.dtype.newbyteorder("<")).tobytes())
-    return digest.hexdigest()

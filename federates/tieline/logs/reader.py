@@ -1,7 +1,6 @@
 """Reads the logs of a run: all processes in one order, some of it, as text."""
 
 import heapq
-import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -121,8 +120,3 @@ def _damaged(path: Path, line: str, last: Record | None) -> Record:
     when = (last.t_ns, last.wall, last.monotonic_ns) if last else (None, "", 0)
     text = f"a damaged line: {line.rstrip()[:200]}"
     return Record(*when, "warning", path.stem, "damaged", text)
-
-
-def as_json(record: Record) -> str:
-    """Return a record as its line."""
-    return json.dumps(vars(record), ensure_ascii=False)

@@ -54,14 +54,13 @@ class Record:
         Raises:
             ValueError: it is none, or was cut short.
         """
-        content = json.loads(line)
         try:
-            record = cls(**content)
-            valid = record.t_ns is None or record.t_ns >= 0
-            valid = valid and record.level in LEVELS and record.wall.endswith("Z")
-        except (TypeError, AttributeError):
-            valid = False
-        if not valid:
+            record = cls(**json.loads(line))
+            is_sound = record.t_ns is None or record.t_ns >= 0
+            is_sound = is_sound and record.level in LEVELS and record.wall.endswith("Z")
+        except (ValueError, TypeError, AttributeError):
+            is_sound = False
+        if not is_sound:
             raise ValueError(f"no record of a log: {str(line)[:80]}")
         return record
 

@@ -96,7 +96,8 @@ class Log:
         if state != self._states.get(federate):
             self._states[federate] = state
             is_failed = state == "failed"
-            text = f"{federate} is {state}" + (f": {word.get('reason')}" if is_failed else "")
+            text = f"{federate} has failed: {word.get('reason')}"
+            text = text if is_failed else f"{federate} is {state}"
             level = "error" if is_failed and word.get("fault") == "own" else "info"
             self._tell(word, level, "state", text)
             self._grants[federate] = time.monotonic(), granted_ns
@@ -120,7 +121,7 @@ class Log:
     def _tell(self, word: Mapping[str, Any], level: str, event: str, text: str) -> None:
         granted_ns = int(word.get("granted_ns", -1))
         t_ns = granted_ns if granted_ns >= 0 else None
-        names = ("federate", "k", "granted_ns", "waits", "cpu_s", "fault", "exit_code")
+        names = ("federate", "state", "k", "granted_ns", "waits", "cpu_s", "fault", "exit_code")
         fields = {name: word[name] for name in names if name in word}
         self._keep(record_now(t_ns, level, self.process, event, text, fields))
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tieline.experiment.results import Run
-from tieline.report.store import Store, columns_of, rows_of
+from tieline.report.store import Store, rows_of
 from tieline.report.traffic_curves import directions
 
 
@@ -43,9 +43,10 @@ def drawing(store: Store, run: Run) -> dict[str, Any] | None:
 
 
 def _put_voltages(store: Store, run: Run, found: Mapping[str, Any]) -> None:
-    grid = run.table("grid")
     buses = [f"B{station['bus']}" for station in found["stations"]]
-    if set(buses) <= set(columns_of(grid, "v_pu")):
+    names = [f"v_pu.{bus}" for bus in buses]
+    if names and set(names) <= set(run.columns("grid")):
+        grid = run.table("grid", "t_s", *dict.fromkeys(names))
         time_s = grid["t_s"].to_numpy(dtype=np.float64)
         store.put("vbus", "grid", time_s, rows_of(grid, "v_pu", buses))
 

@@ -15,13 +15,13 @@ LATER = "Hidden at first: {}, which the disturbance trips and which goes on alon
 
 def put_grid(store: Store, run: Run) -> None:
     """Add what `grid.parquet` of a run holds to a page."""
-    grid, interconnection = run.table("grid"), run.map()
+    grid, interconnection = run.table("grid", "t_s", "coi_pu"), run.map()
     time_s = grid["t_s"].to_numpy(dtype=np.float64)
     nominal_hz = float(run.told()["frequency_hz"])
     unit_areas, bus_areas = areas_of(interconnection)
     coi_hz = nominal_hz * grid["coi_pu"].to_numpy(dtype=np.float64)
     store.put("coi", "grid", time_s, [coi_hz])
-    put = _Putter(store, grid, time_s, unit_areas, bus_areas, run.tripped_units())
+    put = _Putter(store, run, time_s, unit_areas, bus_areas, run.tripped_units())
     put.units("speed", "speed_pu", nominal_hz)
     put.units("vt", "vt_pu")
     put.units("vs", "vs_pu")
@@ -49,28 +49,34 @@ class _Putter:
     def __init__(
         self,
         store: Store,
-        grid: pd.DataFrame,
+        run: Run,
         time_s: Floats,
         unit_areas: Mapping[str, str],
         bus_areas: Mapping[str, str],
         tripped: set[str],
     ) -> None:
         self.curves: dict[str, list[Curve]] = {}
-        self.rows: dict[str, Floats] = {}
-        self._store, self._grid, self._time_s = store, grid, time_s
+        self.wbar: Floats | None = None
+        self._store, self._run, self._time_s = store, run, time_s
         self._areas = {**unit_areas, **bus_areas}
         self._tripped = tripped
 
     def units(self, name: str, quantity: str, factor: float = 1.0) -> None:
         """Add a quantity of every unit that has a value of it at any time."""
-        elements = columns_of(self._grid, quantity)
-        rows = factor * rows_of(self._grid, quantity, elements)
-        self._put(name, elements, rows, is_unit=True)
+        elements, rows = self._read(quantity)
+        self._put(name, elements, factor * rows, is_unit=True)
 
     def buses(self, name: str, quantity: str) -> None:
         """Add a quantity of every bus that has it."""
-        elements = columns_of(self._grid, quantity)
-        self._put(name, elements, rows_of(self._grid, quantity, elements), is_unit=False)
+        elements, rows = self._read(quantity)
+        self._put(name, elements, rows, is_unit=False)
+
+    def _read(self, quantity: str) -> tuple[list[str], Floats]:
+        """Return the elements that have a quantity, and its values; the others stay on disk."""
+        names = [name for name in self._run.columns("grid") if name.startswith(f"{quantity}.")]
+        table = self._run.table("grid", *names) if names else pd.DataFrame()
+        elements = columns_of(table, quantity)
+        return elements, rows_of(table, quantity, elements)
 
     def _put(self, name: str, elements: Sequence[str], rows: Floats, is_unit: bool) -> None:
         kept = [i for i, row in enumerate(rows) if not np.isnan(row).all()]
@@ -78,7 +84,8 @@ class _Putter:
             return
         names = [elements[i] for i in kept]
         self._store.put(name, "grid", self._time_s, rows[kept], names)
-        self.rows[name] = rows[kept]
+        if name == "wbar":
+            self.wbar = rows[kept]
         self.curves[name] = [
             Curve(
                 element if is_unit else f"bus {element[1:]}",
@@ -121,12 +128,12 @@ def _belief(
     nominal_hz: float,
 ) -> None:
     """Add what each controller takes the average for, and by how much it is wrong."""
-    if "wbar" not in put.rows:
+    if put.wbar is None:
         return
-    curves = [c for c in put.curves["wbar"] if not (put.rows["wbar"][c.row] == nominal_hz).all()]
+    curves = [c for c in put.curves["wbar"] if not (put.wbar[c.row] == nominal_hz).all()]
     if not curves:
         return
-    store.put("error", "grid", time_s, 1e3 * (put.rows["wbar"] - coi_hz))
+    store.put("error", "grid", time_s, 1e3 * (put.wbar - coi_hz))
     errors = [Curve(c.label, "error", c.row, c.group, c.unit, c.style) for c in curves]
     store.charts.append(
         Chart("wbar", "Average that each controller believes", "frequency, Hz",

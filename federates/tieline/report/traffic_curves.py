@@ -16,12 +16,18 @@ MOST_BARS = 160
 
 def put_traffic(store: Store, run: Run) -> None:
     """Add what the network's tables of a run hold to a page."""
-    controllers, links = run.table("controller_series"), run.table("link_series")
+    controllers = _some(run, "controller_series", ("t_s", "unit", "delay_mean_s"))
+    links = _some(run, "link_series", ("t_s", "from", "to", "utilisation", "max_queue", *DROPS))
     # Links that carried nothing have no row: their windows are known from the controllers.
     windows = _windows(controllers, links)
     _put_controllers(store, run, controllers, windows)
     _put_distribution(store, run.table("delays"))
     _put_links(store, links, windows)
+
+
+def _some(run: Run, name: str, columns: Sequence[str]) -> pd.DataFrame:
+    """Return some columns of a table; no rows if the run wrote none."""
+    return run.table(name, *columns) if run.columns(name) else pd.DataFrame()
 
 
 def directions(series: pd.DataFrame) -> list[tuple[str, str]]:
