@@ -4,7 +4,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tieline.compiled import compiled
-from tieline.network.engine import LINK_DOWN, LOSS, NO_ARRIVALS, NO_DROPS, QUEUE_FULL, Outcome
+from tieline.network.engine import (
+    LINK_DOWN,
+    LOSS,
+    NO_ARRIVALS,
+    NO_DROPS,
+    QUEUE_FULL,
+    Counts,
+    Outcome,
+)
 from tieline.network.histogram import BINS, bin_of, percentile_ns
 from tieline.network.sequence import LOST, SequenceFigures, SequenceStatistics
 
@@ -97,6 +105,17 @@ class FlowStatistics:
             np.add.at(self.dropped_down, dropped[drops["reason"] == LINK_DOWN], 1)
             ends = np.full(len(drops), LOST)
             self._order.add(dropped, drops["sequence"].astype(np.int64), ends)
+
+    def counts(self) -> Counts:
+        """Return the packets of all flows so far; what is in flight is what has not ended."""
+        return Counts(
+            sent=int(self.sent.sum()),
+            delivered=int(self.delivered.sum()),
+            dropped_queue=int(self.dropped_queue.sum()),
+            dropped_loss=int(self.dropped_loss.sum()),
+            in_flight=int(self.in_flight.sum()),
+            dropped_down=int(self.dropped_down.sum()),
+        )
 
     def order(self) -> SequenceFigures:
         """Return what is defined over sequence numbers."""
