@@ -9,18 +9,23 @@ class TielineError(Exception):
     exit_code = 1
 
 
+_LONGEST_FINDING = 2_000
+
+
 class InputError(TielineError):
     """What the user can fix: a parameter, a case table, an experiment file.
 
     Attributes:
-        findings: every problem found, one sentence each; the message is their list.
+        findings: every problem found, one sentence each; the message is their list. A sentence of
+            more than 2,000 characters, which repeats what some file holds, loses its middle.
     """
 
     exit_code = 2
 
     def __init__(self, findings: str | Iterable[str]) -> None:
         self.findings: tuple[str, ...]
-        self.findings = (findings,) if isinstance(findings, str) else tuple(findings)
+        stated = (findings,) if isinstance(findings, str) else tuple(findings)
+        self.findings = tuple(map(_shortened, stated))
         super().__init__("\n".join(self.findings))
 
 
@@ -42,3 +47,10 @@ class TimeContractBroken(CosimError):
 
 class FrameError(CosimError):
     """Bytes that are not the frame that they should be."""
+
+
+def _shortened(finding: str) -> str:
+    if len(finding) <= _LONGEST_FINDING:
+        return finding
+    half = _LONGEST_FINDING // 2
+    return f"{finding[:half]} ... {finding[-half:]}"

@@ -147,9 +147,14 @@ def _unknown_key(model: type[BaseModel], path: Path) -> str:
 def _unclear(model: type[BaseModel], path: Path, given: object) -> tuple[Path, str]:
     """Return what is unclear about a group that must be one of several kinds, and where."""
     models = _models_at(model, path)
-    common = set.intersection(*(set(kind.model_fields) for kind in models))
-    kinds = [next(name for name in kind.model_fields if name not in common) for kind in models]
+    fields = [set(kind.model_fields) for kind in models]
+    common = set.intersection(*fields) if fields else set()
+    own = [[name for name in kind.model_fields if name not in common] for kind in models]
+    kinds = [names[0] for names in own if names]
     where = dotted(path)
+    if not kinds:
+        # A strange key, such as the number 0, was taken for a part of the path.
+        return path, f"{where} is not understood (got {_shown(given)})"
     if not isinstance(given, dict):
         keys = "at, and " if "at" in common else ""
         text = f"{where} must be a group of keys: {keys}{' or '.join(kinds)}"

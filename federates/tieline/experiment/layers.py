@@ -134,7 +134,7 @@ def _base_of(document: Document) -> pathlib.Path | None:
         return None
     if not isinstance(name, str) or not name:
         raise InputError(
-            f"{_where(document)}: extends must be a file or a shipped name (got {name!r})"
+            f"{_where(document)}: extends must be a file or a shipped name (got {name!r:.60})"
         )
     beside = document.path.parent / name
     for path in (beside, pathlib.Path(f"{beside}.yaml"), _shipped_file(name)):

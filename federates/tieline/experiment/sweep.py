@@ -41,7 +41,7 @@ def expand(sweep: object, data: Any, sources: Sources) -> tuple[list[Point], lis
     if isinstance(sweep, dict):
         return _made(sweep, data, sources)
     where = sources.where([("sweep",)])
-    return [], [f"{where}: sweep must be a list of points, or a group of keys (got {sweep!r})"]
+    return [], [f"{where}: sweep must be a list of points, or a group of keys (got {sweep!r:.60})"]
 
 
 def sweep_streams(sweep: object, data: Any) -> dict[str, Any]:
@@ -106,7 +106,7 @@ def _listed(sweep: Sequence[Any], data: Any, sources: Sources) -> tuple[list[Poi
         if not isinstance(entry, dict):
             where = sources.where([("sweep", i)])
             findings.append(
-                f"{where}: sweep[{i}] must be a group of keys: label, and settings (got {entry!r})"
+                f"{where}: sweep[{i}] must be a group of keys: label, and settings (got {entry!r:.60})"
             )
             continue
         misspelt = next((key for key in entry if "label" not in entry and _is_label(key)), "label")

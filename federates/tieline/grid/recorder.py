@@ -76,7 +76,9 @@ class Recorder:
             parts.append(values * self._to_system_base if name == "Pe_pu" else values)
         parts += [age_s, grid.reading().f_hz, np.abs(grid.voltages())]
         row = np.concatenate(parts)
-        check_finite(row, self._names.__getitem__, float(row[0]))
+        # The centre of inertia comes last: where it is not finite, a unit's speed is the cause.
+        order = np.roll(np.arange(len(row)), -2)
+        check_finite(row[order], lambda i: self._names[order[i]], float(row[0]))
         self._block[:, self._filled] = row
         self._filled += 1
         if self._filled == ROWS_PER_BLOCK:

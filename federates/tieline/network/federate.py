@@ -72,6 +72,7 @@ class NetworkParticipant:
         self._recorder = recorder
         self._captures = captures
         self._frames = FrameStore(len(spec.sources), len(spec.destinations))
+        self._next = 0
 
     def start(self) -> list[bytes]:
         """Return the deliveries of the first intervals, in which no frame can matter."""
@@ -81,13 +82,15 @@ class NetworkParticipant:
         """Return the deliveries of interval k + lead, given the frames measured at t_k.
 
         Raises:
-            TimeContractBroken: the frames were measured at another instant.
+            TimeContractBroken: the frames were measured at another instant, or an interval is left
+                out or comes again.
             CosimError: the message is no frame bundle, it does not have one frame of the right
                 size for each source (or none at all), it comes too late for its frames to enter
                 the network in time, or packets are not accounted for.
         """
         bundle = FrameBundle.from_bytes(received)
         self._check(k, bundle)
+        self._next += 1
         sources = np.arange(len(bundle.payloads))
         if len(sources):
             self._engine.send(bundle.measured_ns, sources, k, bundle.payloads)
@@ -96,7 +99,12 @@ class NetworkParticipant:
         return self._carry(k + self._clock.lead)
 
     def finish(self) -> None:
-        """Write the tables."""
+        """Write the tables.
+
+        Raises:
+            CosimError: packets are not all accounted for.
+        """
+        self._recorder.check()
         self._write()
 
     def abort(self, reason: str) -> None:
@@ -123,6 +131,10 @@ class NetworkParticipant:
         return self._bundle(joined(outcomes), until_ns).to_bytes()
 
     def _check(self, k: int, bundle: FrameBundle) -> None:
+        if k != self._next:
+            raise TimeContractBroken(
+                f"{NETWORK}: the frames of interval {k} came for interval {self._next}"
+            )
         expected_ns = self._clock.at_ns(k)
         if bundle.measured_ns != expected_ns:
             raise TimeContractBroken(

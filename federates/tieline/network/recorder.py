@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tieline.errors import CosimError
 from tieline.network.age import AgeOfInformation
 from tieline.network.ended import ended
 from tieline.network.engine import NO_ARRIVALS, NO_DROPS, Engine, Outcome
@@ -95,6 +96,28 @@ class Recorder:
         if until_ns - self._flushed_ns >= NS_PER_S:
             self._flush()
 
+    def check(self) -> None:
+        """Hold the statistics against the engine's own counts.
+
+        The engine checks itself whenever it is run; this finds what was lost on the way from there.
+
+        Raises:
+            CosimError: a flow has more packets ended than sent, or, in a network without cross
+                traffic, which only the engine counts, the sums are not the engine's.
+        """
+        flows, counts = self._flows, self._engine.counts()
+        counts.check(self._until_ns)
+        for flow in np.flatnonzero(flows.in_flight < 0)[:1]:
+            raise CosimError(
+                f"flow {flow} has more packets ended than sent at {self._until_ns} ns: "
+                f"{flows.sent[flow]} sent, {flows.in_flight[flow]} in flight"
+            )
+        told = flows.counts()
+        if not self._spec.cross_flows and told != counts:
+            raise CosimError(
+                f"the statistics and the engine differ at {self._until_ns} ns: {told} and {counts}"
+            )
+
     def write(self) -> None:
         """Write the tables as far as the run came; the last window may be a shorter one.
 
@@ -117,6 +140,7 @@ class Recorder:
             self._window_ns = None
 
     def _close_window(self, length_ns: int) -> None:
+        self.check()
         self._links.close_window(self._until_ns, length_ns)
         self._controllers.close_window(self._until_ns, self._age.measured_ns)
         self._windows += 1

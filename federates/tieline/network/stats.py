@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from tieline.compiled import compiled
 from tieline.network.ended import NONE_ENDED, Ended
-from tieline.network.engine import LINK_DOWN, LOSS, QUEUE_FULL
+from tieline.network.engine import LINK_DOWN, LOSS, QUEUE_FULL, Counts
 from tieline.network.histogram import BINS, bin_of, percentile_ns
 from tieline.network.sequence import LOST, SequenceFigures, SequenceStatistics
 
@@ -94,6 +94,17 @@ class FlowStatistics:
             np.add.at(self.dropped_loss, lost.flows[reasons == LOSS], 1)
             np.add.at(self.dropped_down, lost.flows[reasons == LINK_DOWN], 1)
             self._order.add(lost.flows, lost.sequences, np.full(len(reasons), LOST))
+
+    def counts(self) -> Counts:
+        """Return the packets of all flows so far; what is in flight is what has not ended."""
+        return Counts(
+            sent=int(self.sent.sum()),
+            delivered=int(self.delivered.sum()),
+            dropped_queue=int(self.dropped_queue.sum()),
+            dropped_loss=int(self.dropped_loss.sum()),
+            in_flight=int(self.in_flight.sum()),
+            dropped_down=int(self.dropped_down.sum()),
+        )
 
     def order(self) -> SequenceFigures:
         """Return what is defined over sequence numbers."""
