@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 import tieline
-from tieline.compiled import UNCOMPILED
 
 ROOT = Path(tieline.__file__).parent
 MODULES = sorted(ROOT.rglob("*.py"))
@@ -146,18 +145,29 @@ def test_floats_and_nanoseconds_meet_in_units_alone() -> None:
         assert not conversion.search(path.read_text(encoding="utf-8")), path
 
 
-def test_what_the_cache_of_compiled_code_leaves_out_takes_no_part_in_it() -> None:
-    """A kernel with an old constant from a file outside the cache's key would stay in use."""
-    outside = [f"tieline.{name}" for name in UNCOMPILED]
-    for path in MODULES:
-        if path.relative_to(ROOT).parts[0] in UNCOMPILED:
-            assert not begins(imports(path), "tieline.compiled", "numba"), path
-    for path in [*part("grid"), *part("network"), *part("wams"), *part("c37118")]:
-        assert not begins(imports(path), *outside), path
-
-
 def test_a_packet_is_looked_up_without_grid_and_federation() -> None:
     """What is repeated is the network of a result; a whole run would be another run."""
     for path in part("fates"):
         forbidden = ("tieline.grid", "tieline.network.federate", "tieline.cosim.federate")
         assert not begins(imports(path), *forbidden), path
+
+
+LARGE = {"numba", "llvmlite", "matplotlib", "pandas", "pyarrow", "scipy", "networkx", "helics"}
+
+
+@pytest.mark.parametrize(
+    ("script", "forbidden"),
+    [
+        ("import tieline.cli", LARGE | {"numpy", "pydantic", "yaml", "rich"}),
+        ("from tieline.experiment.load import load_experiment as l; l('g26_trip')", LARGE),
+        ("import tieline.network.federate, tieline.grid.federate", {"pandas", "matplotlib"}),
+    ],
+    ids=["the command line", "a checked experiment", "the federates"],
+)
+def test_nothing_large_is_imported_before_it_is_used(script: str, forbidden: set[str]) -> None:
+    """Help and a mistake in a file would come seconds late, and every federate start so."""
+    told = "import sys; print(*{name.partition('.')[0] for name in sys.modules})"
+    done = subprocess.run(
+        [sys.executable, "-c", f"{script}; {told}"], check=True, capture_output=True, text=True
+    )
+    assert not forbidden & set(done.stdout.split())

@@ -1,17 +1,10 @@
 """Switches numba on or off for the whole package, so that one code runs compiled or as plain NumPy.
 
 `TIELINE_COMPILER=off` leaves every function as it is written. Fast-math stays off: results must
-not depend on how a compiler reorders sums.
-
-Compiled code is cached. numba renews a cached function when its own file changes, but not when a
-constant or a function that it took from another file does; so each state of the package's source
-has a cache folder of its own, in `$XDG_CACHE_HOME/tieline` unless NUMBA_CACHE_DIR names another.
-What `UNCOMPILED` names takes no part in it: a new word in a report compiles nothing anew.
+not depend on how a compiler reorders sums. Compiled code is kept as `tieline.kernels` says.
 """
 
-import hashlib
 import os
-import shutil
 import warnings
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -19,58 +12,24 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba.core.ccallback import CFunc
 from numba.core.errors import NumbaExperimentalFeatureWarning
+from numba.core.sigutils import normalize_signature
 from numba.typed import List
+
+from tieline import kernels
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 # numba calls first-class functions experimental at each compilation that sees one.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
-UNCOMPILED = (
-    "api", "cli", "compare", "doctor", "experiment", "fates", "logs", "paper", "report", "sweeps",
-)  # fmt: skip
-"""Parts of the package that hold no compiled code, and that none of it takes anything from."""
-
-CACHES_KEPT = 4
-"""Cache folders that stay, the newest first: those of other versions and checkouts."""
-
-
-def _use_own_cache() -> None:
-    """Point numba to the cache folder of this source; leave its default where none can be made."""
-    if "NUMBA_CACHE_DIR" in os.environ:
-        return
-    package = Path(__file__).resolve().parent
-    digest = hashlib.sha256()
-    for path in sorted(package.rglob("*.py")):
-        inside = path.relative_to(package)
-        if inside.parts[0] not in UNCOMPILED:
-            digest.update(inside.as_posix().encode() + path.read_bytes())
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tieline"
-    folder = home / digest.hexdigest()[:16]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        os.utime(folder)
-        others = sorted(home.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
-    except OSError:
-        return
-    for old in others[CACHES_KEPT:]:
-        shutil.rmtree(old, ignore_errors=True)
-    numba.config.CACHE_DIR = str(folder)
+IS_ON = os.environ.get("TIELINE_COMPILER", "on") != "off"
 
 
 def cached() -> tuple[Path | None, int]:
-    """Return the cache folder in use (None: numba's own beside each file) and how much it holds.
-
-    The second is the number of compiled functions.
-    """
-    folder = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else None
-    return folder, 0 if folder is None else sum(1 for _ in folder.rglob("*.nbi"))
-
-
-IS_ON = os.environ.get("TIELINE_COMPILER", "on") != "off"
-if IS_ON:
-    _use_own_cache()
+    """Return the folder that takes compiled functions (None: there is none) and how many exist."""
+    return kernels.folder(), kernels.count()
 
 
 def compiled(function: Function) -> Function:
@@ -80,7 +39,10 @@ def compiled(function: Function) -> Function:
     """
     if not IS_ON:
         return function
-    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    result: Any = numba.njit(nogil=True, error_model="numpy")(function)
+    result._cache = kernels.Kernels(function, result.targetoptions)
+    kept: Function = result
+    return kept
 
 
 def inlined(function: Function) -> Function:
@@ -122,4 +84,8 @@ def _append(functions: Any, function: Any) -> None:
 
 @cache
 def _first_class(function: Callable[..., None], signature: Any) -> Any:
-    return numba.cfunc(signature, cache=True, error_model="numpy")(function)
+    options = {"error_model": "numpy"}
+    result: Any = CFunc(function, normalize_signature(signature), locals={}, options=options)
+    result._cache = kernels.Kernels(function, f"callback {options}")
+    result.compile()
+    return result

@@ -58,7 +58,6 @@ def run(
     A sweep runs its points at once, as `tieline sweep` does.
     """
     from tieline.experiment.load import load_experiment
-    from tieline.sweeps.start import with_core
 
     with reporting(debug):
         if reference is None:
@@ -68,6 +67,8 @@ def run(
         options = [*(settings or ()), *([f"federation.core={core}"] if core else ())]
         study = load_experiment(reference, options)
         if study.is_sweep:
+            from tieline.sweeps.start import with_core
+
             run_sweep_plan(with_core(study), out, jobs, None, False, quiet, as_json)
         else:
             _run_single(study, out, quiet, as_json)
