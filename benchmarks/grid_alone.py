@@ -1,7 +1,7 @@
 """The grid alone on one core: 40 s of the trip of G26, against a fine step, its floor and peers.
 
-The first run on a machine compiles, which is not counted. With `--andes PYTHON` or `--dpsim
-PYTHON`, interpreters that have the package installed, each runs beside tieline in turns.
+The first run on a machine compiles, which is not counted. With `--andes PYTHON`, an interpreter
+that has `andes` installed, ANDES's WECC case is simulated in the same run.
 """
 
 from grid_runs import Ran, g26_grid, g26_system, simulate, speeds  # isort: skip
@@ -140,10 +140,9 @@ def rhs_alone(system: System) -> Row:
     return Row("miniWECC at rest", "a right-hand side called from Python", "us", taken)
 
 
-def beside(name: str, script: str, python: str, own_s: list[float], reach: float) -> list[Row]:
+def beside(name: str, command: list[str | Path], own_s: list[float], reach: float) -> list[Row]:
     """Return a peer's simulated seconds a CPU second, and how many times as many tieline's are."""
-    path = Path(__file__).parent / "peers" / script
-    ran = subprocess.run([python, path], capture_output=True, text=True, check=True)
+    ran = subprocess.run(command, capture_output=True, text=True, check=True)
     peer = json.loads(ran.stdout.splitlines()[-1])
     peers = {name: peer["version"]}
     speed = [peer["seconds"] / s for s in peer["cpu_s"]]
@@ -162,7 +161,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--times", type=int, default=9, help="repetitions")
     parser.add_argument("--andes", metavar="PYTHON", help="an interpreter that has andes")
-    parser.add_argument("--dpsim", metavar="PYTHON", help="an interpreter that has dpsim")
     parser.add_argument("--json", type=Path, help="file for the figures")
     options = parser.parse_args()
     system = g26_system()
@@ -170,9 +168,8 @@ def main() -> None:
     rows += roofline(system, right_hand_side_us(system))
     rows.append(rhs_alone(system))
     if options.andes:
-        rows += beside("ANDES", "andes_simulation.py", options.andes, own_s, 40.0)
-    if options.dpsim:
-        rows += beside("DPsim", "dpsim_simulation.py", options.dpsim, own_s, 3.0)
+        script = Path(__file__).parent / "peers" / "andes_simulation.py"
+        rows += beside("ANDES", [options.andes, script], own_s, 40.0)
     save(rows, options.json)
 
 
