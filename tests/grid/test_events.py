@@ -69,7 +69,7 @@ def test_a_fault_that_goes_out_by_itself_leaves_the_network_as_it_was(system: Sy
     grid = grid_with(system, {"at": 0.1, "fault_bus": 63, "clear_after": "50 ms"})
     grid.advance(48 + 24)
     assert not grid._network.shunts
-    for name in ("u_value", "l_value", "u_diagonal"):
+    for name in ("u_value", "l_value", "u_reciprocal"):
         got, whole = getattr(grid._plan.factors, name), getattr(system.plan.factors, name)
         np.testing.assert_array_equal(got, whole)
 

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from tieline.compiled import compiled
 from tieline.grid.loads import settle
 from tieline.grid.models.base import SIGNALS
-from tieline.grid.network import solve
 from tieline.grid.plan import HELD, SENSORS, Average, Jobs, Plan, Work
 from tieline.grid.sensors import Sensors, filter_angles
 
@@ -47,11 +46,9 @@ def solve_network(plan: Plan, work: Work) -> bool:
     for i in range(len(plan.unit_bus)):
         inner = complex(signals[EPP_RE, i], signals[EPP_IM, i])
         work.source[plan.unit_bus[i]] += plan.unit_admittance[i] * inner
-    solve(plan.factors, work.source, work.scratch, work.v_open)
     converged = settle(
-        plan.loads, plan.load_transfer, work.load_factor, work.v_open, work.v, work.source
+        plan.load_network, plan.factors, work.load_factor, work.source, work.scratch, work.v
     )
-    solve(plan.factors, work.source, work.scratch, work.v)
     show_voltages(plan, work)
     return converged
 

@@ -122,7 +122,9 @@ class GridFederate:
         self._belief = WideAreaAverage(len(run.fitted), idcodes, weights, f0_hz)
         is_fitted = np.zeros(len(case.units))
         is_fitted[run.fitted] = 1.0
-        self._recorder = Recorder(folder / "grid.parquet", self._grid, sensors, is_fitted)
+        self._recorder = Recorder(
+            folder / "grid.parquet", self._grid, self._per_record, sensors, is_fitted
+        )
         self._modulation = Modulation(self._grid, run.owners) if run.owners else None
 
     def start(self) -> list[bytes]:
@@ -160,7 +162,7 @@ class GridFederate:
                 seen = until
             self._grid.advance(tick)
             if tick % self._per_record == 0 and tick < last:
-                self._record()
+                self._note_age()
         return self._frames(last)
 
     def modulate(self, k: int, commands: Sequence[Command]) -> None:
@@ -175,7 +177,8 @@ class GridFederate:
 
     def finish(self) -> None:
         """Record the last instant and complete the tables."""
-        self._record()
+        self._note_age()
+        self._recorder.finish()
         self._recorder.close()
         self._write_log()
         counts = self._belief.counts
@@ -245,7 +248,8 @@ class GridFederate:
                 values, lambda i, name=name: f"{name}.B{self._sensors[i]}", at_s, LARGEST_IN_A_FRAME
             )
 
-    def _record(self) -> None:
+    def _note_age(self) -> None:
+        """Say how old the controllers' data are at the row that the grid writes next."""
         if self._grid.ending is not None:
             return
         now_ns = tick_ns(self._grid.tick, self._grid.steps_per_second)
@@ -253,7 +257,7 @@ class GridFederate:
             age_s = self._belief.age_s(now_ns)
         else:
             age_s = np.full(len(self._run.fitted), min(now_ns, self._run.delay_ns) / NS_PER_S)
-        self._recorder.record(age_s)
+        self._recorder.age(age_s)
 
 
 def _check_tags(bundle: DeliveryBundle, arrivals_ns: Integers, readings: Readings) -> None:

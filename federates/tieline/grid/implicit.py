@@ -20,6 +20,7 @@ from tieline.grid.blocks import cut
 from tieline.grid.equations import WBAR, average_now, rhs
 from tieline.grid.integrate import (
     DONE,
+    LOST,
     MOVED,
     NO_NETWORK_SOLUTION,
     NOT_CONVERGED,
@@ -38,6 +39,7 @@ from tieline.grid.newton import (
 )
 from tieline.grid.plan import HELD, Plan, Work
 from tieline.grid.system import System
+from tieline.grid.watch import Watch, has_lost, note
 from tieline.grid.wbar import Averages, hear, late_average
 
 Floats = NDArray[np.float64]
@@ -69,7 +71,14 @@ class Trapezoid:
         return int(self._step.worst[0])
 
     def advance(
-        self, plan: Plan, work: Work, averages: Averages, x: Floats, tick: int, steps: int
+        self,
+        plan: Plan,
+        work: Work,
+        watch: Watch,
+        averages: Averages,
+        x: Floats,
+        tick: int,
+        steps: int,
     ) -> tuple[int, int]:
         """Integrate `x` in place, as `integrate.Integrator` says."""
         if plan is not self._plan:
@@ -80,11 +89,11 @@ class Trapezoid:
             if self._by is not None:
                 tick, status = advance(
                     self._functions, plan, work, self._blocks, self._by, self._step,
-                    averages, x, tick, end - tick, self._h,
+                    watch, averages, x, tick, end - tick, self._h,
                 )  # fmt: skip
             if status == WITH_CARE:
-                status = self._step_with_care(plan, work, averages, x, tick)
-                tick += status == DONE
+                status = self._step_with_care(plan, work, watch, averages, x, tick)
+                tick += status in (DONE, LOST)
             elif status == TIRED:
                 self._by, status = None, DONE
             if status != DONE:
@@ -92,7 +101,7 @@ class Trapezoid:
         return end, DONE
 
     def _step_with_care(
-        self, plan: Plan, work: Work, averages: Averages, x: Floats, tick: int
+        self, plan: Plan, work: Work, watch: Watch, averages: Averages, x: Floats, tick: int
     ) -> int:
         """Take one step, with new matrices where it needs them; return its status.
 
@@ -108,6 +117,7 @@ class Trapezoid:
                 work.signals[WBAR] = late_average(averages.past, tick, average.delay_steps, 0)
             if not rhs(self._functions, plan, work, s.x0, s.f0):
                 return NO_NETWORK_SOLUTION
+            note(watch, plan.sensors, work, x, tick)
             if is_late:
                 work.signals[WBAR] = late_average(averages.past, tick, average.delay_steps, 2)
             begin(s, x, work.v)
@@ -118,6 +128,8 @@ class Trapezoid:
         if status == DONE and average.mode != HELD:
             past = averages.past
             past[(tick + 1) % len(past)] = average_now(average, plan.sensors, x)
+        if status == DONE and has_lost(watch, x, tick + 1):
+            return LOST
         return status
 
     def _iterate(self, plan: Plan, work: Work, x: Floats, is_newton: bool) -> int:

@@ -13,6 +13,7 @@ from tieline.grid.anti_windup import stop_at_limit
 from tieline.grid.equations import WBAR, average_now, rhs
 from tieline.grid.plan import HELD, Plan, Work
 from tieline.grid.system import System
+from tieline.grid.watch import Watch, has_lost, note
 from tieline.grid.wbar import Averages, hear, late_average
 
 Floats = NDArray[np.float64]
@@ -42,7 +43,7 @@ METHODS = {
     ),
 }
 
-DONE, NO_NETWORK_SOLUTION, NOT_FINITE, NOT_CONVERGED = 0, 1, 2, 3
+DONE, NO_NETWORK_SOLUTION, NOT_FINITE, NOT_CONVERGED, LOST = 0, 1, 2, 3, 4
 
 AT_LIMIT = -1
 """A state may have run past a non-windup limit in the step before."""
@@ -52,10 +53,28 @@ MOVED = 1e-9
 
 
 @compiled
+def add(x: Floats, share: float, rates: Floats) -> None:
+    """Add a share (s) of some rates to states, in place; nothing where the share is 0."""
+    if share != 0.0:
+        for i in range(len(x)):
+            x[i] += share * rates[i]
+
+
+@compiled
+def is_finite(x: Floats) -> bool:
+    """Return whether every state is a finite number."""
+    total = 0.0
+    for value in x:
+        total += 0.0 * value
+    return total == 0.0
+
+
+@compiled
 def advance(
     functions: Any,
     plan: Plan,
     work: Work,
+    watch: Watch,
     averages: Averages,
     x: Floats,
     before: Floats,
@@ -69,12 +88,13 @@ def advance(
 
     Args:
         functions, plan, work: the system.
+        watch: what is looked at on the way.
         averages: of the past, and those that will be heard on the way.
         x: states (n,); before: the same one step ago; k: scratch (stages + 1, n).
         tick, steps, h, method: where it starts, how far, step in s, tableau.
 
     Returns:
-        The tick reached and `DONE`, or the tick of the step that was not taken and why.
+        The tick reached and `DONE` or `LOST`, or the tick of the step that was not taken and why.
     """
     is_late = plan.average.mode != HELD and plan.average.delay_steps > 0
     stages = len(method.b)
@@ -84,25 +104,27 @@ def advance(
         for stage in range(stages):
             at_stage[:] = x
             for earlier in range(stage):
-                if method.a[stage, earlier] != 0.0:
-                    at_stage += (h * method.a[stage, earlier]) * k[earlier]
+                add(at_stage, h * method.a[stage, earlier], k[earlier])
             if is_late:
                 delay = plan.average.delay_steps
                 work.signals[WBAR] = late_average(averages.past, now, delay, method.half[stage])
             if not rhs(functions, plan, work, at_stage, k[stage]):
                 return now, NO_NETWORK_SOLUTION
             if stage == 0:
+                note(watch, plan.sensors, work, x, now)
                 for i in range(len(x)):
                     if k[0, i] == 0.0 and abs(x[i] - before[i]) > MOVED:
                         return now, AT_LIMIT
         before[:] = x
         for stage in range(stages):
-            x += (h * method.b[stage]) * k[stage]
-        if not np.isfinite(x).all():
+            add(x, h * method.b[stage], k[stage])
+        if not is_finite(x):
             return now, NOT_FINITE
         if plan.average.mode != HELD:
             past = averages.past
             past[(now + 1) % len(past)] = average_now(plan.average, plan.sensors, x)
+        if has_lost(watch, x, now + 1):
+            return now + 1, LOST
     return tick + steps, DONE
 
 
@@ -115,18 +137,27 @@ class Integrator(Protocol):
         ...
 
     def advance(
-        self, plan: Plan, work: Work, averages: Averages, x: Floats, tick: int, steps: int
+        self,
+        plan: Plan,
+        work: Work,
+        watch: Watch,
+        averages: Averages,
+        x: Floats,
+        tick: int,
+        steps: int,
     ) -> tuple[int, int]:
         """Integrate `x` in place over `steps` steps from `tick`.
 
         Args:
             plan, work: the system as it is now.
+            watch: what is looked at on the way; the row of the last tick is the next call's.
             averages: of the past, and those that will be heard on the way.
             x: states (n,).
             tick, steps: where it starts and how far.
 
         Returns:
-            The tick reached and `DONE`, or the tick of the step that failed and why.
+            The tick reached and `DONE`, or `LOST` where a unit is, or the tick of the step that
+            failed and why.
         """
         ...
 
@@ -152,13 +183,20 @@ class RungeKutta:
         return 0
 
     def advance(
-        self, plan: Plan, work: Work, averages: Averages, x: Floats, tick: int, steps: int
+        self,
+        plan: Plan,
+        work: Work,
+        watch: Watch,
+        averages: Averages,
+        x: Floats,
+        tick: int,
+        steps: int,
     ) -> tuple[int, int]:
         """Integrate `x` in place, as `Integrator` says."""
         end, status = tick + steps, AT_LIMIT
         while status == AT_LIMIT:
             tick, status = advance(
-                self._functions, plan, work, averages, x, self._before, self._k,
+                self._functions, plan, work, watch, averages, x, self._before, self._k,
                 tick, end - tick, self._h, self._method,
             )  # fmt: skip
             if status == AT_LIMIT:

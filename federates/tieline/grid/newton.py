@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from tieline.compiled import compiled
 from tieline.grid.blocks import Blocks
 from tieline.grid.equations import WBAR, average_now, rhs
-from tieline.grid.integrate import DONE, MOVED, NO_NETWORK_SOLUTION
+from tieline.grid.integrate import DONE, LOST, MOVED, NO_NETWORK_SOLUTION
 from tieline.grid.jacobian import Elimination, correct
 from tieline.grid.plan import HELD, Plan, Work
+from tieline.grid.watch import Watch, has_lost, note
 from tieline.grid.wbar import Averages, hear, late_average
 
 Floats = NDArray[np.float64]
@@ -118,6 +119,7 @@ def advance(
     blocks: Blocks,
     by: Elimination,
     s: Step,
+    watch: Watch,
     averages: Averages,
     x: Floats,
     tick: int,
@@ -129,12 +131,13 @@ def advance(
     Args:
         functions, plan, work: the system.
         blocks, by, s: how it is solved.
+        watch: what is looked at on the way.
         averages: of the past, and those that will be heard on the way.
         x: states (n,).
         tick, steps, h: where it starts, how far, step in s.
 
     Returns:
-        The tick reached, and `DONE`, `TIRED`, `WITH_CARE` or why it failed.
+        The tick reached, and `DONE`, `LOST`, `TIRED`, `WITH_CARE` or why it failed.
     """
     is_late = plan.average.mode != HELD and plan.average.delay_steps > 0
     for now in range(tick, tick + steps):
@@ -144,6 +147,7 @@ def advance(
             work.signals[WBAR] = late_average(averages.past, now, plan.average.delay_steps, 0)
         if not rhs(functions, plan, work, s.x0, s.f0):
             return now, NO_NETWORK_SOLUTION
+        note(watch, plan.sensors, work, x, now)
         if is_late:
             work.signals[WBAR] = late_average(averages.past, now, plan.average.delay_steps, 2)
         begin(s, x, work.v)
@@ -163,6 +167,8 @@ def advance(
         if plan.average.mode != HELD:
             past = averages.past
             past[(now + 1) % len(past)] = average_now(plan.average, plan.sensors, x)
+        if has_lost(watch, x, now + 1):
+            return now + 1, LOST
         if iterations > MANY:
             return now + 1, TIRED
     return tick + steps, DONE

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.grid.loads import LoadCurrents
+from tieline.grid.loads import LoadCurrents, LoadNetwork
 from tieline.grid.network import Factors
 from tieline.grid.sensors import Sensors
 
@@ -69,7 +69,7 @@ class Plan(NamedTuple):
 
     Attributes:
         unit_bus: (units,) bus index; unit_admittance: (units,) Norton admittance, system base.
-        load_transfer: (loads, loads) voltages for unit currents, of these factors.
+        load_network: what the loads settle with these factors.
         frozen: places in x of states that an event has stopped.
     """
 
@@ -78,7 +78,7 @@ class Plan(NamedTuple):
     unit_admittance: Complexes
     factors: Factors
     loads: LoadCurrents
-    load_transfer: Complexes
+    load_network: LoadNetwork
     sensors: Sensors
     average: Average
     frozen: Integers
@@ -92,7 +92,6 @@ class Work(NamedTuple):
 
     signals: Floats
     v: Complexes
-    v_open: Complexes
     source: Complexes
     scratch: Complexes
     load_factor: Floats

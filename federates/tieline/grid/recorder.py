@@ -13,6 +13,7 @@ from tieline.tables import Column, TableStream
 Floats = NDArray[np.float64]
 
 ROWS_PER_BLOCK = 60
+"""Rows that are written at once: a second of them is the most that a killed process loses."""
 
 _UNIT_QUANTITIES = (
     ("speed_pu", "omega", "pu", "rotor speed of {}"),
@@ -24,6 +25,9 @@ _UNIT_QUANTITIES = (
     ("wbar_pu", "wbar", "pu", "average speed that the controller of {} believes"),
 )
 
+_NAMES = [name for name, *_ in _UNIT_QUANTITIES]
+_SIGNALS = [signal for _, signal, *_ in _UNIT_QUANTITIES]
+
 
 class Recorder:
     """Writes rows of the grid's quantities, in blocks.
@@ -34,14 +38,16 @@ class Recorder:
     Args:
         path: the Parquet file to make.
         grid: what is recorded.
+        per_row: steps of the grid from row to row.
         sensors: bus numbers with a PMU, for `f_hz`.
         fitted: (units,) which units have a controller, for `age_s`.
     """
 
-    def __init__(self, path: Path, grid: Grid, sensors: Sequence[int], fitted: Floats) -> None:
+    def __init__(
+        self, path: Path, grid: Grid, per_row: int, sensors: Sequence[int], fitted: Floats
+    ) -> None:
         self._grid = grid
         case = grid.system.case
-        self._to_system_base = case.unit_MVA / case.base.base_MVA
         self._fitted = np.flatnonzero(fitted)
         columns = [
             Column("t_s", "s", "simulated time"),
@@ -58,40 +64,50 @@ class Recorder:
         self._names = [column.name for column in columns]
         tripped = "a unit that is tripped goes on as it is simulated, alone"
         self._stream = TableStream(path, columns, {"tripped_units": tripped})
-        self._block = np.empty((len(columns), ROWS_PER_BLOCK))
-        self._filled = 0
+        self._ages: list[Floats] = []
+        scale = np.ones((len(_UNIT_QUANTITIES), len(case.units)))
+        scale[_NAMES.index("Pe_pu")] = case.unit_MVA / case.base.base_MVA
+        self._units_end = 2 + scale.size
+        grid.record(per_row, _SIGNALS, scale, ROWS_PER_BLOCK, self._write)
 
-    def record(self, age_s: Floats) -> None:
-        """Add a row for the grid as it is; `age_s` (controllers,) is of its controllers' data.
+    def age(self, age_s: Floats) -> None:
+        """Say how old the controllers' data (controllers,) are at the next row, mean by unit, s."""
+        self._ages.append(age_s)
+
+    def finish(self) -> None:
+        """Add the row of the grid as it is, unless the run is over.
 
         Raises:
-            NumericalError: a value of the row is not finite; the row is left out.
+            NumericalError: a value of a row is not finite.
         """
-        grid = self._grid
-        parts: list[Floats] = [
-            np.array([grid.tick / grid.steps_per_second, grid.centre_of_inertia()])
-        ]
-        for name, signal, _, _ in _UNIT_QUANTITIES:
-            values = grid.signal(signal)
-            parts.append(values * self._to_system_base if name == "Pe_pu" else values)
-        parts += [age_s, grid.reading().f_hz, np.abs(grid.voltages())]
-        row = np.concatenate(parts)
+        self._grid.record_now()
+
+    def close(self) -> None:
+        """Write what is left and finish the file; a second call does nothing.
+
+        Raises:
+            NumericalError: a value of a row is not finite; the file then ends before that row.
+        """
+        try:
+            self._grid.hand_over()
+        finally:
+            self._stream.close()
+
+    def _write(self, rows: Floats) -> None:
+        """Write rows (rows, values) and their ages, up to the first that is not finite."""
+        ages = np.array(self._ages[: len(rows)]).reshape(len(rows), len(self._fitted))
+        del self._ages[: len(rows)]
+        at = self._units_end
+        block = np.concatenate([rows[:, :at], ages, rows[:, at:]], axis=1)
+        is_sound = np.isfinite(block).all(axis=1)
+        sound = len(rows) if is_sound.all() else int(np.argmin(is_sound))
+        columns = np.ascontiguousarray(block[:sound].T)
+        self._stream.append(dict(zip(self._names, columns, strict=True)))
+        self._stream.flush()
+        if sound < len(rows):
+            self._refuse(block[sound])
+
+    def _refuse(self, row: Floats) -> None:
         # The centre of inertia comes last: where it is not finite, a unit's speed is the cause.
         order = np.roll(np.arange(len(row)), -2)
         check_finite(row[order], lambda i: self._names[order[i]], float(row[0]))
-        self._block[:, self._filled] = row
-        self._filled += 1
-        if self._filled == ROWS_PER_BLOCK:
-            self._write()
-
-    def close(self) -> None:
-        """Write what is left and finish the file; a second call does nothing."""
-        self._write()
-        self._stream.close()
-
-    def _write(self) -> None:
-        if self._filled:
-            rows = self._block[:, : self._filled]
-            self._stream.append(dict(zip(self._names, rows.copy(), strict=True)))
-            self._stream.flush()
-        self._filled = 0

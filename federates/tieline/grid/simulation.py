@@ -1,6 +1,6 @@
 """The grid in motion: a state that advances by whole steps, meets events and hears the network."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from tieline.grid.equations import WBAR, average_now, rhs
 from tieline.grid.events import Disturbance
 from tieline.grid.integrate import (
     DONE,
+    LOST,
     NO_NETWORK_SOLUTION,
     NOT_CONVERGED,
 )
@@ -30,6 +31,7 @@ from tieline.grid.topology import (
     live_buses,
     units_in_service,
 )
+from tieline.grid.watch import Watch, centre_of_inertia, write_row
 from tieline.grid.wbar import hear, late_average, no_averages
 
 VREF = SIGNALS.index("Vref")
@@ -80,7 +82,6 @@ class Grid:
         self.log: list[tuple[int, str]] = []
         self._integrator = integrator(method, system, 1.0 / steps_per_second)
         self._plan = system.plan
-        self._per_look = max(1, steps_per_second // LOOKS_PER_SECOND)
         self._agenda = Agenda(events)
         self._network = NetworkState()
         self._work = _copy(system.work)
@@ -89,6 +90,8 @@ class Grid:
         self._dx = np.zeros(len(self._x))
         self._averages = no_averages(self._plan.average.delay_steps, len(self.in_service))
         self._inertia = system.case.unit_MVA * inertia(system.case)
+        self._watch = self._unrecorded()
+        self._on_full: Callable[[Floats], None] = _forget
         self._is_current = False
         self._apply_due()
 
@@ -96,6 +99,62 @@ class Grid:
     def x(self) -> Floats:
         """Return (n,) the states, a copy."""
         return self._x.copy()
+
+    def _unrecorded(self) -> Watch:
+        return Watch(
+            per_look=max(1, self.steps_per_second // LOOKS_PER_SECOND),
+            omega=self._plan.average.omega,
+            delta=self.system.delta,
+            weight=self._inertia.copy(),
+            per_row=0,
+            steps_per_second=self.steps_per_second,
+            quantity=np.zeros(0, np.int64),
+            scale=np.zeros((0, len(self.in_service))),
+            rows=np.zeros((0, 0)),
+            noted=np.array([0, -1]),
+        )
+
+    def record(
+        self,
+        per_row: int,
+        signals: Sequence[str],
+        scale: Floats,
+        capacity: int,
+        on_full: Callable[[Floats], None],
+    ) -> None:
+        """Write a row of `watch.Watch` at every `per_row` ticks from now on, as the grid leaves it.
+
+        Args:
+            per_row: ticks between two rows.
+            signals: the units' signals that are recorded.
+            scale: (signals, units) their factors.
+            capacity: rows after which `on_full` is called with all of them (rows, values).
+            on_full: takes rows, which are overwritten afterwards.
+        """
+        width = 2 + scale.size + self.system.plan.sensors.pmus + len(self.is_live)
+        self._on_full = on_full
+        self._watch = self._watch._replace(
+            per_row=per_row,
+            quantity=np.array([SIGNALS.index(name) for name in signals], np.int64),
+            scale=np.ascontiguousarray(scale),
+            rows=np.empty((capacity, width)),
+        )
+
+    def record_now(self) -> None:
+        """Write the present row, and hand over all that were not yet; the last act of a run."""
+        watch = self._watch
+        if self.ending is None and watch.noted[1] < self.tick:
+            self._refresh()
+            self._until_full()
+            write_row(watch, self._plan.sensors, self._view, self._x, self.tick)
+        self.hand_over()
+
+    def hand_over(self) -> None:
+        """Give the rows since the last time to whoever records."""
+        filled = int(self._watch.noted[0])
+        if filled:
+            self._watch.noted[0] = 0
+            self._on_full(self._watch.rows[:filled])
 
     def expect(self, due: NDArray[np.int64], told: Floats) -> None:
         """Have stabilisers believe averages as soon as they come.
@@ -116,7 +175,8 @@ class Grid:
         self._is_current = False
 
     def _hear(self) -> None:
-        if np.any(self._averages.due == self.tick):
+        due = self._averages.due
+        if len(due) and due[0] <= self.tick <= due[-1] and np.any(due == self.tick):
             hear(self._averages, self.tick, self._work.signals[WBAR])
             self._is_current = False
 
@@ -130,20 +190,28 @@ class Grid:
         if to_tick < self.tick:
             raise ValueError(f"tick {to_tick} lies before the current one, {self.tick}")
         while self.tick < to_tick and self.ending is None:
-            looked_at = (self.tick // self._per_look + 1) * self._per_look
             stop = self._agenda.next_stop(self.tick)
-            self._run(min(to_tick, looked_at, to_tick if stop is None else stop))
-            if self.tick % self._per_look == 0 and self.ending is None:
-                self._look()
+            self._run(min(to_tick, to_tick if stop is None else stop, self._until_full()))
             if self.ending is None:
                 self._apply_due()
             self._hear()
+
+    def _until_full(self) -> int:
+        """Hand over rows that are full; return the tick up to which there is room for more."""
+        watch = self._watch
+        if watch.per_row == 0:
+            return np.iinfo(np.int64).max
+        if watch.noted[0] == len(watch.rows):
+            self.hand_over()
+        room = len(watch.rows) - int(watch.noted[0])
+        return (self.tick // watch.per_row + room) * watch.per_row
 
     def _run(self, to_tick: int) -> None:
         self._is_current = False
         reached, status = self._integrator.advance(
             self._plan,
             self._work,
+            self._watch,
             self._averages,
             self._x,
             self.tick,
@@ -152,6 +220,8 @@ class Grid:
         self.tick = reached
         if status == NO_NETWORK_SOLUTION and np.isfinite(self._x).all():
             self._end(Ending(reached, f"voltage collapse: {self._failure(self._work)}"))
+        elif status == LOST:
+            self._look()
         elif status == NOT_CONVERGED:
             worst = self.system.labels[self._integrator.worst]
             raise NumericalError(
@@ -163,9 +233,9 @@ class Grid:
 
     def _look(self) -> None:
         """End the run if a unit in service is lost."""
-        omega, delta = self._x[self._plan.average.omega], self._x[self.system.delta]
-        weight = np.where(self.in_service, self._inertia, 0.0)
-        ending = lost(self.system.case, self.tick, omega, delta, weight)
+        watch = self._watch
+        omega, delta = self._x[watch.omega], self._x[watch.delta]
+        ending = lost(self.system.case, self.tick, omega, delta, watch.weight)
         if ending is not None:
             self._end(ending)
 
@@ -201,6 +271,7 @@ class Grid:
         """Give the plan the network that events have left; units and averages follow."""
         case = self.system.case
         self.in_service = units_in_service(case, self._network)
+        self._watch.weight[:] = np.where(self.in_service, self._inertia, 0.0)
         live = live_buses(case, self._network)
         dead = case.buses.number[self.is_live & ~live].tolist()
         if dead:
@@ -279,11 +350,11 @@ class Grid:
 
         A unit without inertia is left out, and with no other in service the speed is 1.
         """
-        omega = self._x[self._plan.average.omega]
-        weight = np.where(self.in_service, self._inertia, 0.0)
-        if not weight.any():
-            return 1.0
-        return float(1.0 + (weight * (omega - 1.0)).sum() / weight.sum())
+        return float(centre_of_inertia(self._watch, self._x))
+
+
+def _forget(rows: Floats) -> None:
+    """Take rows that nobody records."""
 
 
 def _copy(work: Work) -> Work:

@@ -13,7 +13,7 @@ from tieline.grid.case import Case
 from tieline.grid.devices import Group, groups
 from tieline.grid.equations import rhs
 from tieline.grid.initialise import initial_states, require_rest
-from tieline.grid.loads import frequency_buses, load_currents, load_transfer, nominal_admittance
+from tieline.grid.loads import frequency_buses, load_currents, load_network, nominal_admittance
 from tieline.grid.models.base import SIGNALS, SIGNATURE, Equation, Machine, Model
 from tieline.grid.network import factorise
 from tieline.grid.plan import ROTORS, SENSORS, Average, Jobs, Plan, Work
@@ -195,8 +195,8 @@ def _network(
     load = nominal_admittance(case, flow)
     factors = factorise(network_matrix(case, state, load, machine, flow.v))
     loads = scaled_loads(load_currents(case, flow, pmus), state)
-    transfer = load_transfer(factors, loads)
-    return {"factors": factors, "loads": loads, "load_transfer": transfer}
+    settling = load_network(factors, loads)
+    return {"factors": factors, "loads": loads, "load_network": settling}
 
 
 def _machine_admittance(case: Case, found: Sequence[Group]) -> NDArray[np.complex128]:
@@ -238,9 +238,8 @@ def _work(flow: PowerFlow, signals: Floats, jobs: Jobs, loads: int) -> Work:
     return Work(
         signals=signals,
         v=flow.phasor,
-        v_open=flow.phasor,
         source=np.zeros(count, np.complex128),
-        scratch=np.zeros(count, np.complex128),
+        scratch=np.zeros((2, count), np.complex128),
         load_factor=np.ones((2, loads)),
         u=np.zeros(largest),
         y=np.zeros(largest),

@@ -14,13 +14,6 @@ def to_rotor(delta: Array, re: Array, im: Array) -> tuple[Array, Array]:
 
 
 @compiled
-def to_network(delta: Array, d: Array, q: Array) -> tuple[Array, Array]:
-    """Return real and imaginary part of a phasor from its d and q components."""
-    sin, cos = np.sin(delta), np.cos(delta)
-    return sin * d + cos * q, sin * q - cos * d
-
-
-@compiled
 def current_behind(
     e_re: Array, e_im: Array, v_re: Array, v_im: Array, ra: Array, x: Array
 ) -> tuple[Array, Array]:

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from tieline.compiled import compiled
 from tieline.grid.models.base import Array, Equation, Machine, Parameter, indices
-from tieline.grid.models.park import to_network
 
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter("H", "s", "inertia constant", above=0),
@@ -33,8 +32,8 @@ X = indices(STATES)
 
 
 @compiled
-def fluxes(x: Array, p: Array) -> tuple[Array, Array]:
-    """Return psi''_d and psi''_q."""
+def fluxes(x: Array, p: Array) -> tuple[float, float]:
+    """Return psi''_d and psi''_q of one unit with states `x` (states,), parameters `p`."""
     share_d = (p[P.xd_pp] - p[P.xl]) / (p[P.xd_p] - p[P.xl])
     share_q = (p[P.xq_pp] - p[P.xl]) / (p[P.xq_p] - p[P.xl])
     psi_d = share_d * x[X.Eq_p] + (1.0 - share_d) * x[X.psi_kd]
@@ -43,23 +42,24 @@ def fluxes(x: Array, p: Array) -> tuple[Array, Array]:
 
 
 @compiled
-def currents(x: Array, u: Array, p: Array, psi_d: Array, psi_q: Array) -> tuple[Array, Array]:
-    """Return i_d and i_q, given the terminal voltage in the first two rows of `u`."""
-    sin, cos = np.sin(x[X.delta]), np.cos(x[X.delta])
-    d_d = -x[X.omega] * psi_q - (sin * u[0] - cos * u[1])
-    d_q = x[X.omega] * psi_d - (cos * u[0] + sin * u[1])
+def currents(
+    x: Array, v_d: float, v_q: float, p: Array, psi_d: float, psi_q: float
+) -> tuple[float, float]:
+    """Return i_d and i_q of one unit, given the terminal voltage on its axes."""
+    d_d = -x[X.omega] * psi_q - v_d
+    d_q = x[X.omega] * psi_d - v_q
     ra, xpp = p[P.ra], p[P.xd_pp]
     square = ra * ra + xpp * xpp
     return (ra * d_d + xpp * d_q) / square, (ra * d_q - xpp * d_d) / square
 
 
 @compiled
-def field_current(x: Array, p: Array, i_d: Array) -> Array:
-    """Return I_fd = E'_q + (x_d - x'_d) [i_d + (x'_d - x'') / (x'_d - x_l)^2 e_a]."""
+def field_current(x: Array, p: Array, i_d: float) -> float:
+    """Return I_fd = E'_q + (x_d - x'_d) [i_d + (x'_d - x'') / (x'_d - x_l)^2 e_a] of one unit."""
     span = p[P.xd_p] - p[P.xl]
     e_a = x[X.Eq_p] - x[X.psi_kd] - span * i_d
-    return x[X.Eq_p] + (p[P.xd] - p[P.xd_p]) * (
-        i_d + (p[P.xd_p] - p[P.xd_pp]) / (span * span) * e_a
+    return float(
+        x[X.Eq_p] + (p[P.xd] - p[P.xd_p]) * (i_d + (p[P.xd_p] - p[P.xd_pp]) / (span * span) * e_a)
     )
 
 
@@ -69,29 +69,47 @@ def norton(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
     E'' = omega [(psi''_d cos delta - psi''_q sin delta)
                  + j (psi''_q cos delta + psi''_d sin delta)]
     """
-    psi_d, psi_q = fluxes(x, p)
-    sin, cos = np.sin(x[X.delta]), np.cos(x[X.delta])
-    y[0] = x[X.omega] * (psi_d * cos - psi_q * sin)
-    y[1] = x[X.omega] * (psi_q * cos + psi_d * sin)
-    y[2] = x[X.omega]
-    y[3] = x[X.delta]
+    for i in range(x.shape[1]):
+        psi_d, psi_q = fluxes(x[:, i], p[:, i])
+        delta, omega = x[X.delta, i], x[X.omega, i]
+        sin, cos = np.sin(delta), np.cos(delta)
+        y[0, i] = omega * (psi_d * cos - psi_q * sin)
+        y[1, i] = omega * (psi_q * cos + psi_d * sin)
+        y[2, i] = omega
+        y[3, i] = delta
 
 
 def electrical(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
     """Write terminal power, field current and terminal current."""
+    for i in range(x.shape[1]):
+        terminals(x[:, i], u[:, i], p[:, i], y[:, i])
+
+
+@compiled
+def terminals(x: Array, u: Array, p: Array, y: Array) -> None:
+    """Write one unit's terminal power, field current and terminal current."""
     psi_d, psi_q = fluxes(x, p)
-    i_d, i_q = currents(x, u, p, psi_d, psi_q)
     sin, cos = np.sin(x[X.delta]), np.cos(x[X.delta])
-    y[0] = (sin * u[0] - cos * u[1]) * i_d + (cos * u[0] + sin * u[1]) * i_q
+    v_d, v_q = sin * u[0] - cos * u[1], cos * u[0] + sin * u[1]
+    i_d, i_q = currents(x, v_d, v_q, p, psi_d, psi_q)
+    y[0] = v_d * i_d + v_q * i_q
     y[1] = field_current(x, p, i_d)
-    y[2], y[3] = to_network(x[X.delta], i_d, i_q)
+    y[2], y[3] = sin * i_d + cos * i_q, sin * i_q - cos * i_d
+
+
+def motion(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
+    """Write the derivatives of rotor and fluxes (equations in the class docstring)."""
+    for i in range(x.shape[1]):
+        move(x[:, i], u[:, i], p[:, i], dx[:, i])
 
 
 @compiled
 def move(x: Array, u: Array, p: Array, dx: Array) -> None:
-    """Write the derivatives of rotor and fluxes (equations in the class docstring)."""
+    """Write the derivatives of one unit's rotor and fluxes."""
     psi_d, psi_q = fluxes(x, p)
-    i_d, i_q = currents(x, u, p, psi_d, psi_q)
+    sin, cos = np.sin(x[X.delta]), np.cos(x[X.delta])
+    v_d, v_q = sin * u[0] - cos * u[1], cos * u[0] + sin * u[1]
+    i_d, i_q = currents(x, v_d, v_q, p, psi_d, psi_q)
     Efd, Pm, w_s = u[2], u[3], u[4]
     span_q = p[P.xq_p] - p[P.xl]
     e_b = x[X.Ed_p] - x[X.psi_kq] - span_q * i_q
@@ -103,11 +121,6 @@ def move(x: Array, u: Array, p: Array, dx: Array) -> None:
     drop_q = i_q + (p[P.xq_p] - p[P.xq_pp]) / (span_q * span_q) * e_b
     dx[X.Ed_p] = (-x[X.Ed_p] - (p[P.xq] - p[P.xq_p]) * drop_q) / p[P.Tq0_p]
     dx[X.psi_kq] = e_b / p[P.Tq0_pp]
-
-
-def motion(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
-    """Write the derivatives of rotor and fluxes."""
-    move(x, u, p, dx)
 
 
 def at_rest(delta: Array, signals: dict[str, Array], p: Array) -> Array:

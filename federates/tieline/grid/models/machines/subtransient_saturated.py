@@ -13,12 +13,10 @@ from tieline.grid.models.machines import subtransient
 from tieline.grid.models.machines.subtransient import (
     Subtransient,
     X,
-    currents,
-    field_current,
     fluxes,
     move,
+    terminals,
 )
-from tieline.grid.models.park import to_network
 
 PARAMETERS = (
     *subtransient.PARAMETERS,
@@ -37,21 +35,27 @@ def saturated(psi_d: Array, psi_q: Array, p: Array) -> tuple[Array, Array]:
     return s * psi_d, s * psi_q * (p[P.xq] - p[P.xl]) / (p[P.xd] - p[P.xl])
 
 
+@compiled
+def saturation_at(x: Array, p: Array) -> tuple[Array, Array]:
+    """Return the two axes' saturation (n,) at the states `x`."""
+    psi_d, psi_q = np.empty(x.shape[1]), np.empty(x.shape[1])
+    for i in range(x.shape[1]):
+        psi_d[i], psi_q[i] = fluxes(x[:, i], p[:, i])
+    return saturated(psi_d, psi_q, p)
+
+
 def electrical(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
     """Write terminal power, saturated field current and terminal current."""
-    psi_d, psi_q = fluxes(x, p)
-    i_d, i_q = currents(x, u, p, psi_d, psi_q)
-    sin, cos = np.sin(x[X.delta]), np.cos(x[X.delta])
-    y[0] = (sin * u[0] - cos * u[1]) * i_d + (cos * u[0] + sin * u[1]) * i_q
-    y[1] = field_current(x, p, i_d) + saturated(psi_d, psi_q, p)[0]
-    y[2], y[3] = to_network(x[X.delta], i_d, i_q)
+    for i in range(x.shape[1]):
+        terminals(x[:, i], u[:, i], p[:, i], y[:, i])
+    y[1] += saturation_at(x, p)[0]
 
 
 def motion(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
     """Write the derivatives of rotor and fluxes: those without saturation, less its two terms."""
-    move(x, u, p, dx)
-    psi_d, psi_q = fluxes(x, p)
-    more_d, more_q = saturated(psi_d, psi_q, p)
+    for i in range(x.shape[1]):
+        move(x[:, i], u[:, i], p[:, i], dx[:, i])
+    more_d, more_q = saturation_at(x, p)
     dx[X.Eq_p] -= more_d / p[P.Td0_p]
     dx[X.Ed_p] -= more_q / p[P.Tq0_p]
 

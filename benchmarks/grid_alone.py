@@ -1,0 +1,177 @@
+"""The grid alone on one core: 40 s of the trip of G26, against a fine step, its floor and peers.
+
+The first run on a machine compiles, which is not counted. With `--andes PYTHON`, an interpreter
+that has `andes` installed, ANDES's WECC case is simulated in the same run.
+"""
+
+from grid_runs import Ran, g26_grid, g26_system, simulate, speeds  # isort: skip
+
+import argparse
+import json
+import subprocess
+import time
+from pathlib import Path
+from statistics import median
+
+import numba
+import numpy as np
+from figures import Row, save
+
+from tieline.grid.equations import rhs
+from tieline.grid.system import System
+
+SECONDS, RATE, FINE = 40, 120, 1920
+WORK = f"miniWECC, {SECONDS} s, RK4 at {RATE} steps a second, recorded at 60 Hz"
+SWEEPS = 9
+"""Sweeps over the loads in a right-hand side, the mean of this run."""
+FLOPS = {
+    "subtransient": 3 * 16 + 2 * 20 + 62,
+    "st3_potential": 19,
+    "reheat_hydro": 23,
+    "generalized_delta_omega": 34,
+}
+"""Operations of a unit's equations, counted from their text."""
+ANGLES = 3
+"""Sine and cosine pairs of a machine."""
+
+
+def accuracy(system: System, ran: Ran) -> float:
+    """Return the largest difference of a speed to the run in steps of 1/1920 s, pu."""
+    fine = simulate(system, SECONDS, FINE)
+    return float(np.abs(speeds(system, ran.rows) - speeds(system, fine.rows)).max())
+
+
+def right_hand_side_us(system: System, times: int = 60) -> list[float]:
+    """Return what a right-hand side costs in motion, in each of several runs, us."""
+    taken = []
+    for _ in range(times):
+        grid = g26_grid(system, RATE, at_s=0.1)
+        grid.advance(RATE)
+        began = time.process_time()
+        grid.advance(RATE + 40)
+        taken.append((time.process_time() - began) * 1e6 / (4 * 40))
+    return sorted(taken)[: times // 2]
+
+
+@numba.njit
+def _multiply_add(x: np.ndarray, times: int) -> float:
+    total = 0.0
+    for _ in range(times):
+        for i in range(len(x)):
+            x[i] = x[i] * 0.999999 + 1e-9
+    return total + x[0]
+
+
+@numba.njit
+def _turn(x: np.ndarray, times: int) -> float:
+    total = 0.0
+    for _ in range(times):
+        for i in range(len(x)):
+            total += np.sin(x[i]) + np.cos(x[i])
+    return total
+
+
+def rate_of(kernel: object, times: int) -> float:
+    """Return how many elements a second a kernel takes, the best of many short runs."""
+    x = np.linspace(0.1, 1.2, 512)
+    kernel(x, 1)  # type: ignore[operator]
+    best = np.inf
+    for _ in range(200):
+        began = time.perf_counter()
+        kernel(x, times)  # type: ignore[operator]
+        best = min(best, time.perf_counter() - began)
+    return times * len(x) / best
+
+
+def operations(system: System) -> tuple[float, float, float]:
+    """Return floating-point operations, sine and cosine pairs, and bytes of a right-hand side."""
+    plan = system.plan
+    flops = sum(FLOPS[group.model.key] * len(group.units) for group in system.groups)
+    entries = len(plan.factors.l_value) + len(plan.factors.u_value)
+    buses, loads = len(plan.factors.u_reciprocal), len(plan.loads.bus)
+    flops += 2 * (8 * entries + 6 * buses) + SWEEPS * loads * (8 * loads + 40)
+    flops += 14 * len(plan.sensors.bus) + 4 * len(system.x0)
+    pairs = ANGLES * len(plan.unit_bus) + len(plan.sensors.bus)
+    size = plan.jobs.parameters.nbytes + 5 * system.x0.nbytes + 2 * (24 * entries + 80 * buses)
+    size += SWEEPS * plan.load_network.transfer.nbytes + 2 * system.work.signals.nbytes
+    return float(flops), float(pairs), float(size)
+
+
+def roofline(system: System, measured_us: list[float]) -> list[Row]:
+    """Return what a right-hand side costs beside what its arithmetic alone would."""
+    flops, pairs, size = operations(system)
+    # Multiply and add, four at a time: what this core does from its first cache.
+    flop_rate, pair_rate = 2.0 * rate_of(_multiply_add, 20), rate_of(_turn, 2)
+    floor_us = 1e6 * (flops / flop_rate + pairs / pair_rate)
+    note = (
+        f"the floor: {flops:,.0f} operations at {flop_rate / 1e9:.1f} a ns and {pairs:.0f} sines "
+        f"with cosines at {1e9 / pair_rate:.0f} ns; {size / 1e3:.0f} kB pass through the registers "
+        "and stay in the second cache, so that memory is no limit"
+    )
+    return [
+        Row(WORK, "a right-hand side", "us", measured_us),
+        Row(WORK, "its arithmetic alone", "us", [floor_us], note=note),
+    ]
+
+
+def alone(system: System, times: int) -> tuple[list[Row], list[float]]:
+    """Return the rows of tieline without peers, and its CPU seconds."""
+    simulate(system, 2, RATE)
+    runs = [simulate(system, SECONDS, RATE) for _ in range(times)]
+    cpu_s = [ran.cpu_s for ran in runs]
+    rows = [
+        Row(WORK, "CPU time, integration and recording", "s", cpu_s),
+        Row(WORK, "times real time", "", [SECONDS / s for s in cpu_s], reach=100.0),
+        Row(
+            WORK, f"largest error of a speed against {FINE} steps a second", "pu",
+            [accuracy(system, runs[0])], "at most", 1e-6,
+        ),
+    ]  # fmt: skip
+    return rows, cpu_s
+
+
+def rhs_alone(system: System) -> Row:
+    """Return what one call of the right-hand side from Python costs at rest."""
+    x, dx, taken = system.x0.copy(), np.zeros_like(system.x0), []
+    for _ in range(300):
+        began = time.perf_counter()
+        rhs(system.functions, system.plan, system.work, x, dx)
+        taken.append((time.perf_counter() - began) * 1e6)
+    return Row("miniWECC at rest", "a right-hand side called from Python", "us", taken)
+
+
+def beside(name: str, command: list[str | Path], own_s: list[float], reach: float) -> list[Row]:
+    """Return a peer's simulated seconds a CPU second, and how many times as many tieline's are."""
+    ran = subprocess.run(command, capture_output=True, text=True, check=True)
+    peer = json.loads(ran.stdout.splitlines()[-1])
+    peers = {name: peer["version"]}
+    speed = [peer["seconds"] / s for s in peer["cpu_s"]]
+    own = SECONDS / median(own_s)
+    return [
+        Row(peer["work"], f"times real time, {name}", "", speed, peers=peers),
+        Row(
+            f"{WORK}, beside {peer['work']}", f"speed of tieline against {name}", "",
+            [own / value for value in speed], reach=reach, peers=peers, note=peer["note"],
+        ),
+    ]  # fmt: skip
+
+
+def main() -> None:
+    """Run every measurement and print it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--times", type=int, default=9, help="repetitions")
+    parser.add_argument("--andes", metavar="PYTHON", help="an interpreter that has andes")
+    parser.add_argument("--json", type=Path, help="file for the figures")
+    options = parser.parse_args()
+    system = g26_system()
+    rows, own_s = alone(system, options.times)
+    rows += roofline(system, right_hand_side_us(system))
+    rows.append(rhs_alone(system))
+    if options.andes:
+        script = Path(__file__).parent / "peers" / "andes_simulation.py"
+        rows += beside("ANDES", [options.andes, script], own_s, 40.0)
+    save(rows, options.json)
+
+
+if __name__ == "__main__":
+    main()
