@@ -22,6 +22,8 @@ import numba
 from numba.core.errors import NumbaExperimentalFeatureWarning
 from numba.typed import List
 
+from tieline.indices import IndicesFromZero
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 # numba calls first-class functions experimental at each compilation that sees one.
@@ -79,6 +81,14 @@ def compiled(function: Function) -> Function:
     if not IS_ON:
         return function
     return numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+
+
+def compiled_from_zero(function: Function) -> Function:
+    """Return `function` as `compiled` does; no index in it is negative, and none is a slice."""
+    if not IS_ON:
+        return function
+    options = {"cache": True, "nogil": True, "error_model": "numpy"}
+    return numba.njit(**options, pipeline_class=IndicesFromZero)(function)
 
 
 def inlined(function: Function) -> Function:
