@@ -23,11 +23,18 @@ import numpy as np
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
 
+from figures import Row, save  # noqa: E402
+
 from network.test_ns3_reference import PMUS, wide_area_network  # noqa: E402
 from tieline.network.engine import Engine  # noqa: E402
 from tieline.network.packet import PacketEngine  # noqa: E402
 
 FRAMES, RATE_HZ, REPETITIONS = 90, 60, 7
+HOPS_PER_S, TIMES_NS3 = 4.0, 40
+ROOFLINE = """a packet-hop at a plain port reads and writes five lines of 64 bytes (event, packet, \
+plan, two of the port) and a line of the queue's ring, and sifts one event of 24 bytes through a \
+binary heap of up to 496 events, nine levels of two; all of it (packets, plans, ports and events, \
+about 150 kB) fits the second-level cache, so instructions bound it, not memory"""
 
 
 def measured(engine: Engine, frames_at_a_time: int) -> dict[str, Any]:
@@ -49,12 +56,9 @@ def measured(engine: Engine, frames_at_a_time: int) -> dict[str, Any]:
     return {"hops": hops, "cpu_s": cpu_s, "digest": digest.hexdigest()}
 
 
-def said(what: str, runs: list[dict[str, Any]]) -> float:
-    """Print the rate of several runs, and return its median, hops a CPU second."""
-    rates = [run["hops"] / run["cpu_s"] for run in runs]
-    low, high = min(rates) / 1e6, max(rates) / 1e6
-    print(f"{what:44} {median(rates) / 1e6:7.3f} million packet-hops/s ({low:.3f} to {high:.3f})")
-    return median(rates)
+def rates_of(runs: list[dict[str, Any]]) -> list[float]:
+    """Return the rate of each run, million packet-hops a CPU second."""
+    return [run["hops"] / run["cpu_s"] / 1e6 for run in runs]
 
 
 def ns3_runs() -> list[dict[str, Any]]:
@@ -67,10 +71,22 @@ def ns3_runs() -> list[dict[str, Any]]:
     return [run]
 
 
+def ns3_in_turn(python: str) -> list[dict[str, Any]]:
+    """Return three runs of ns-3 in another interpreter."""
+    runs = []
+    for _ in range(3):
+        command = [python, __file__, "--child"]
+        ran = subprocess.run(command, capture_output=True, text=True, check=True)
+        runs += json.loads(ran.stdout.splitlines()[-1])
+    return runs
+
+
 def main() -> None:
     """Run every measurement and print it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--ns3", metavar="PYTHON", help="an interpreter that has ns3 and tieline")
+    parser.add_argument("--repetitions", type=int, default=REPETITIONS)
+    parser.add_argument("--json", type=Path, help="file for the figures")
     parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.child:
@@ -78,23 +94,28 @@ def main() -> None:
         os._exit(0)
     spec = wide_area_network()
     measured(PacketEngine(spec, 1), 1)
-    steps = {"tieline, in one step": FRAMES, "tieline, stepped every 16.7 ms": 1}
-    rates, digests = {}, set()
-    for what, frames_at_a_time in steps.items():
-        runs = [measured(PacketEngine(spec, 1), frames_at_a_time) for _ in range(REPETITIONS)]
+    what, unit = "reference wide-area network", "million packet-hops / CPU s"
+    rows, digests, rates = [], set(), {}
+    for figure, at_a_time in {"in one step": FRAMES, "stepped every 16.7 ms": 1}.items():
+        runs = [measured(PacketEngine(spec, 1), at_a_time) for _ in range(options.repetitions)]
         digests |= {run["digest"] for run in runs}
-        rates[what] = said(what, runs)
-    print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6:.0f} MB")
+        rates[figure] = rates_of(runs)
+        rows.append(Row(what, figure, unit, rates[figure], "at least", HOPS_PER_S))
+    cost_ns = [1e3 / rate for rate in rates["in one step"]]
+    rows.append(Row(what, "cost of a packet-hop", "ns CPU", cost_ns, "at most", note=ROOFLINE))
     if options.ns3:
-        runs = []
-        for _ in range(3):
-            command = [options.ns3, __file__, "--child"]
-            ran = subprocess.run(command, capture_output=True, text=True, check=True)
-            runs += json.loads(ran.stdout.splitlines()[-1])
-        rate = said("ns-3 3.44, in one step", runs)
+        runs = ns3_in_turn(options.ns3)
         digests |= {run["digest"] for run in runs}
-        print(f"tieline against ns-3: {rates['tieline, in one step'] / rate:.0f} times")
-    print("every packet the same" if len(digests) == 1 else f"outcomes differ: {digests}")
+        peers = {"ns-3": "3.44"}
+        rows.append(Row(what, "ns-3, in one step", unit, rates_of(runs), peers=peers))
+        ratio = [rate / median(rates_of(runs)) for rate in rates["in one step"]]
+        rows.append(Row(what, "times ns-3", "", ratio, "at least", TIMES_NS3, peers))
+    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
+    rows.append(Row(what, "peak memory", "MB", [peak_mb]))
+    save(rows, options.json)
+    if len(digests) > 1:
+        sys.exit(f"outcomes differ: {digests}")
+    print("every packet the same")
 
 
 if __name__ == "__main__":

@@ -13,11 +13,13 @@ from typing import Any, TypeVar
 
 import numba
 from numba.core.ccallback import CFunc
+from numba.core.compiler import Compiler, CompilerBase
 from numba.core.errors import NumbaExperimentalFeatureWarning
 from numba.core.sigutils import normalize_signature
 from numba.typed import List
 
 from tieline import kernels
+from tieline.indices import IndicesFromZero
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -37,10 +39,18 @@ def compiled(function: Function) -> Function:
 
     It runs without the interpreter's lock, so that both federates of one process work at once.
     """
-    if not IS_ON:
-        return function
-    result: Any = numba.njit(nogil=True, error_model="numpy")(function)
-    result._cache = kernels.Kernels(function, result.targetoptions)
+    return _kept(function, Compiler) if IS_ON else function
+
+
+def compiled_from_zero(function: Function) -> Function:
+    """Return `function` as `compiled` does; no index in it is negative, and none is a slice."""
+    return _kept(function, IndicesFromZero) if IS_ON else function
+
+
+def _kept(function: Function, pipeline: type[CompilerBase]) -> Function:
+    options = {"nogil": True, "error_model": "numpy"}
+    result: Any = numba.njit(**options, pipeline_class=pipeline)(function)
+    result._cache = kernels.Kernels(function, f"{pipeline.__name__} {options}")
     kept: Function = result
     return kept
 

@@ -5,12 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tieline.network.engine import ARRIVAL, DROP, LOSS, NO_DROPS, QUEUE_FULL, Outcome
-from tieline.network.histogram import BINS, bin_of, middle_ns, percentile_ns
+from tieline.network.ended import NONE_ENDED, Ended, ended
+from tieline.network.engine import ARRIVAL, DROP, LOSS, QUEUE_FULL
+from tieline.network.histogram import BINS, Histograms, bin_of, count, middle_ns
 from tieline.network.stats import DELAY_BIN_NS, FlowStatistics
 from tieline.streams import stream
 
 LEAST_NS = 95_000_000
+RATE_HZ = 60
 
 
 def arrivals_of(delays_ns: np.ndarray) -> np.ndarray:
@@ -21,11 +23,17 @@ def arrivals_of(delays_ns: np.ndarray) -> np.ndarray:
     return records
 
 
+def at_zero(records: np.ndarray, flow_of: tuple = ((0,),)) -> Ended:
+    """Return arrivals or drops as if all frames had been measured at zero."""
+    found = ended(records, np.array(flow_of), RATE_HZ)
+    return found._replace(measured_ns=0 * found.measured_ns, delays_ns=found.ended_ns)
+
+
 def statistics_of(delays_ns: np.ndarray, least_ns: int = LEAST_NS) -> FlowStatistics:
     """Return the statistics of one flow of these delays, added a few at a time."""
     statistics = FlowStatistics(np.array([least_ns]), np.array([[0]]))
     for part in np.array_split(arrivals_of(delays_ns), 7):
-        statistics.add(Outcome(part, NO_DROPS), np.zeros(len(part), np.int64))
+        statistics.add(at_zero(part), NONE_ENDED, np.empty(0, np.uint8))
     return statistics
 
 
@@ -106,7 +114,9 @@ def test_packets_are_counted_where_they_end():
     drops["destination"] = [1, 0, 0]
     drops["reason"] = [QUEUE_FULL, LOSS, LOSS]
     drops["sequence"] = [0, 0, 1]
-    statistics.add(Outcome(arrivals_of(np.array([5])), drops), np.zeros(1, np.int64))
+    flow_of = ((0, 1), (2, 3))
+    arrived = at_zero(arrivals_of(np.array([5])), flow_of)
+    statistics.add(arrived, at_zero(drops, flow_of), drops["reason"])
     assert statistics.sent.tolist() == [1, 1, 2, 2]
     assert statistics.dropped_queue.tolist() == [0, 1, 0, 0]
     assert statistics.dropped_loss.tolist() == [0, 0, 2, 0]
@@ -116,8 +126,9 @@ def test_packets_are_counted_where_they_end():
 
 def test_the_nearest_rank_of_few_counts():
     """Otherwise the percentile of a short run would lie between packets, or outside them."""
-    counts = np.zeros(BINS, dtype=np.uint32)
-    counts[[3, 10]] = [1, 3]
-    assert percentile_ns(counts, 0.25) == middle_ns(3)
-    assert percentile_ns(counts, 0.26) == middle_ns(10)
-    assert percentile_ns(counts, 1.0) == middle_ns(10)
+    few = Histograms(2)
+    for excess_ns in (3 << 10, 10 << 10, 10 << 10, 1 << 30):
+        while not count(1, excess_ns, few.block_of, few.counts, few.used):
+            few.grow()
+    for share, excess_ns in ((0.25, 3 << 10), (0.26, 10 << 10), (0.75, 10 << 10), (1.0, 1 << 30)):
+        assert few.percentiles_ns(share)[1] == middle_ns(bin_of(excess_ns))

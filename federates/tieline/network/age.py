@@ -8,7 +8,7 @@ with time and falls when a fresher frame arrives; a frame that was overtaken cha
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled_from_zero
 
 NEVER = -1
 """Measurement of the freshest frame where none has arrived."""
@@ -68,7 +68,7 @@ class AgeOfInformation:
         return np.where(self.measured_ns != NEVER, values, np.nan)
 
 
-@compiled
+@compiled_from_zero
 def _update(
     flows: NDArray[np.int64],
     arrival_ns: NDArray[np.int64],

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled_from_zero
 from tieline.units import NS_PER_S
 
 
@@ -48,7 +48,7 @@ def ended(records: NDArray[np.void], flow_of: NDArray[np.int64], rate_hz: int) -
     return Ended(*table)
 
 
-@compiled
+@compiled_from_zero
 def _describe(
     ended_ns: NDArray[np.int64],
     sources: NDArray[np.uint16],

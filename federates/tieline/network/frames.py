@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled_from_zero
 from tieline.cosim.interfaces import DELIVERY
 from tieline.network.engine import NO_ARRIVALS, NO_DROPS, Outcome
 from tieline.network.spec import FRAME_BYTES
@@ -79,7 +79,7 @@ class FrameStore:
             setattr(self, name, new)
 
 
-@compiled
+@compiled_from_zero
 def _hand_over(
     arrivals: NDArray[np.void],
     frames: NDArray[np.uint8],

@@ -8,16 +8,17 @@ middle of its bin, so it is within 0.8 % of the excess, or half a microsecond, o
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled_from_zero
 
 _UNIT_BITS = 10
-_HALF = 64
+_HALF_BITS = 6
+_HALF = 1 << _HALF_BITS
 _LAST_SHIFT = 26
 BINS = _HALF * _LAST_SHIFT + 2 * _HALF
 """Bins of one flow; the last ends at 2.4 hours and takes what is longer, too."""
 
 
-@compiled
+@compiled_from_zero
 def bin_of(excess_ns: int) -> int:
     """Return the bin of an excess; a negative one counts as zero."""
     units = max(0, excess_ns) >> _UNIT_BITS
@@ -27,20 +28,80 @@ def bin_of(excess_ns: int) -> int:
     return min(_HALF * shift + (units >> shift), BINS - 1)
 
 
-def middle_ns(number: int) -> float:
-    """Return the middle of a bin."""
-    shift = max(0, number // _HALF - 1)
+def middle_ns(number: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the middle of bins, of the shape of their numbers."""
+    shift = np.maximum(0, number // _HALF - 1)
     low = (number - _HALF * shift) << (shift + _UNIT_BITS)
-    return low + (1 << (shift + _UNIT_BITS)) / 2
+    middle: NDArray[np.float64] = low + (1 << (shift + _UNIT_BITS)) / 2
+    return middle
 
 
-def percentile_ns(counts: NDArray[np.uint32], share: float) -> float:
-    """Return the excess that `share` of the counted ones do not exceed, by nearest rank.
+class Histograms:
+    """The bins of many flows, which a flow has only where its delays are, 64 at a time.
 
-    Args:
-        counts: (BINS,) at least one of them above zero.
-        share: above 0, at most 1.
+    Attributes:
+        block_of: (flows, BINS / 64) the row of `counts` that holds 64 bins of a flow, or -1.
+        counts: (rows, 64) the bins; rows are taken in order.
+        used: (1,) how many rows are taken.
     """
-    cumulative = np.cumsum(counts, dtype=np.int64)
-    rank = max(1, int(np.ceil(share * cumulative[-1])))
-    return middle_ns(int(np.searchsorted(cumulative, rank)))
+
+    def __init__(self, flows: int) -> None:
+        self.block_of = np.full((flows, BINS // _HALF), -1, dtype=np.int32)
+        self.counts = np.zeros((max(1, flows), _HALF), dtype=np.uint32)
+        self.used = np.zeros(1, dtype=np.int64)
+
+    def grow(self) -> None:
+        """Make room for half as many rows again."""
+        more = np.zeros((len(self.counts) // 2 + 1, _HALF), dtype=np.uint32)
+        self.counts = np.concatenate([self.counts, more])
+
+    def percentiles_ns(self, share: float) -> NDArray[np.float64]:
+        """Return (flows,) the excess that `share` of each flow's do not exceed, by nearest rank.
+
+        Args:
+            share: above 0, at most 1. Of a flow without any the result means nothing.
+        """
+        bins = np.zeros(len(self.block_of), dtype=np.int64)
+        _rank(share, self.block_of, self.counts, bins)
+        return middle_ns(bins)
+
+
+@compiled_from_zero
+def count(
+    flow: int,
+    excess_ns: int,
+    block_of: NDArray[np.int32],
+    counts: NDArray[np.uint32],
+    used: NDArray[np.int64],
+) -> bool:
+    """Count an excess of a flow; return whether there was room for its bin."""
+    number = bin_of(excess_ns)
+    block = block_of[flow, number >> _HALF_BITS]
+    if block < 0:
+        block = used[0]
+        if block == len(counts):
+            return False
+        block_of[flow, number >> _HALF_BITS] = block
+        used[0] += 1
+    counts[block, number & (_HALF - 1)] += 1
+    return True
+
+
+@compiled_from_zero
+def _rank(
+    share: float, block_of: NDArray[np.int32], counts: NDArray[np.uint32], bins: NDArray[np.int64]
+) -> None:
+    for flow in range(len(block_of)):
+        total = 0
+        for part in range(block_of.shape[1]):
+            if block_of[flow, part] >= 0:
+                for place in range(_HALF):
+                    total += counts[block_of[flow, part], place]
+        left = max(1, int(np.ceil(share * total)))
+        for part in range(block_of.shape[1]):
+            if block_of[flow, part] < 0:
+                continue
+            for place in range(_HALF):
+                if left > 0:
+                    left -= counts[block_of[flow, part], place]
+                    bins[flow] = _HALF * part + place

@@ -7,6 +7,8 @@ from itertools import pairwise
 from typing import Literal
 
 import networkx as nx
+import numpy as np
+from numpy.typing import NDArray
 
 from tieline.network.spec import FRAME_BYTES, Link, Route, service_ns
 
@@ -61,7 +63,9 @@ class Router:
             # No link has length zero: equal ways could go round in a circle.
             length = length or 1 if routing.is_split else length + 1
             self._graph.add_edge(*sorted((link.a, link.b)), length=length)
-        self._paths: dict[str, dict[str, list[str]]] = {}
+        self._names = list(self._graph)
+        self._number_of = {name: number for number, name in enumerate(self._names)}
+        self._previous: dict[str, NDArray[np.int32]] = {}
         self._before: dict[str, dict[str, list[str]]] = {}
 
     def route(self, origin: str, target: str, flow: str = "") -> Route | None:
@@ -76,12 +80,28 @@ class Router:
             return fixed
         if self._routing.is_split:
             return self._spread(origin, target, flow)
-        if origin not in self._paths:
-            self._paths[origin] = nx.single_source_dijkstra_path(
-                self._graph, origin, weight="length"
-            )
-        path = self._paths[origin].get(target)
-        return None if path is None else tuple(path)
+        if origin not in self._previous:
+            self._previous[origin] = self._tree(origin)
+        previous, place = self._previous[origin], self._number_of[target]
+        if previous[place] < 0:
+            return None
+        way = [place]
+        while previous[place] != place:
+            place = previous[place]
+            way.append(place)
+        return tuple(self._names[place] for place in reversed(way))
+
+    def _tree(self, origin: str) -> NDArray[np.int32]:
+        """Return (nodes,) the node before each on its way from an origin: itself there, or -1.
+
+        A number for each node: whole paths would take memory with the square of the network.
+        """
+        before, _ = nx.dijkstra_predecessor_and_distance(self._graph, origin, weight="length")
+        before[origin] = [origin]
+        tree = np.full(len(self._names), -1, dtype=np.int32)
+        for name, ways in before.items():
+            tree[self._number_of[name]] = self._number_of[ways[0]]
+        return tree
 
     def _spread(self, origin: str, target: str, flow: str) -> Route | None:
         """Walk back from the target, at each node along one of the equal ways."""

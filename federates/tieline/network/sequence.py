@@ -9,7 +9,7 @@ depend on when they were handed over.
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled_from_zero
 from tieline.errors import CosimError
 
 LOST = -2
@@ -18,7 +18,7 @@ LOST = -2
 _UNKNOWN = -1
 _NOT_SENT = -3
 
-_FIRST_ROOM = 16
+_FIRST_ROOM = 4
 
 # Columns of a flow's state. Sequence numbers before NEXT are settled, EXPECTED follows the highest
 # one that has arrived.
@@ -157,7 +157,7 @@ class SequenceFigures:
         return np.where(counts > 0, self._state[:, sum_] / np.maximum(counts, 1), np.nan)
 
 
-@compiled
+@compiled_from_zero
 def _take(
     start: int,
     flows: NDArray[np.int64],
@@ -188,7 +188,7 @@ def _take(
     return len(flows)
 
 
-@compiled
+@compiled_from_zero
 def _arrive(
     flow: int, sequence: int, mask: int, state: NDArray[np.int64], passed: NDArray[np.int64]
 ) -> None:
@@ -209,7 +209,7 @@ def _arrive(
     state[flow, _MOST_EXTENT] = max(state[flow, _MOST_EXTENT], extent)
 
 
-@compiled
+@compiled_from_zero
 def _settle(flow: int, end: int, state: NDArray[np.int64]) -> None:
     """Take into account how packet NEXT ended, when all before it have been."""
     sequence = state[flow, _NEXT]
@@ -231,7 +231,7 @@ def _settle(flow: int, end: int, state: NDArray[np.int64]) -> None:
     state[flow, _LONGEST] = max(state[flow, _LONGEST], state[flow, _PERIOD])
 
 
-@compiled
+@compiled_from_zero
 def _settle_all(state: NDArray[np.int64], known: NDArray[np.int64]) -> None:
     """Settle what is known, with what is not taken as neither delivered nor lost."""
     room = known.shape[1]

@@ -91,7 +91,7 @@ class Destination:
     jitter: Jitter | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Flow:
     """One unicast UDP flow from source to destination (numbers), along a fixed route."""
 

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled_from_zero
 from tieline.network.ended import NONE_ENDED, Ended
 from tieline.network.engine import LINK_DOWN, LOSS, QUEUE_FULL, Counts
-from tieline.network.histogram import BINS, bin_of, percentile_ns
+from tieline.network.histogram import Histograms, count
 from tieline.network.sequence import LOST, SequenceFigures, SequenceStatistics
 
 DELAY_BIN_NS = 100_000
@@ -46,7 +46,7 @@ class FlowStatistics:
         self.delay_counts = np.zeros(DELAY_BINS + 1, dtype=np.int64)
         self._delays = np.zeros((flows, 5), dtype=np.int64)
         self._smoothed_ns = np.zeros(flows)
-        self._bins = np.zeros((flows, BINS), dtype=np.uint32)
+        self._histograms = Histograms(flows)
         self._order = SequenceStatistics(flows)
         # Compiles, where that is still to be done, before the federation waits for an answer.
         self.add(NONE_ENDED, NONE_ENDED, np.empty(0, np.uint8))
@@ -79,15 +79,10 @@ class FlowStatistics:
         Raises:
             CosimError: a packet ended twice.
         """
-        _add_delays(
-            arrived.flows,
-            arrived.delays_ns,
-            self._least_ns,
-            self._delays,
-            self._smoothed_ns,
-            self._bins,
-            self.delay_counts,
-        )
+        place = self._add_delays(0, arrived)
+        while place < len(arrived.flows):
+            self._histograms.grow()
+            place = self._add_delays(place, arrived)
         self._order.add(arrived.flows, arrived.sequences, arrived.delays_ns)
         if len(reasons):
             np.add.at(self.dropped_queue, lost.flows[reasons == QUEUE_FULL], 1)
@@ -105,6 +100,22 @@ class FlowStatistics:
             in_flight=int(self.in_flight.sum()),
             dropped_down=int(self.dropped_down.sum()),
         )
+
+    def _add_delays(self, start: int, arrived: Ended) -> int:
+        """Take delays from a place on; return where it stopped for want of room for bins."""
+        stop: int = _add_delays(
+            start,
+            arrived.flows,
+            arrived.delays_ns,
+            self._least_ns,
+            self._delays,
+            self._smoothed_ns,
+            self._histograms.block_of,
+            self._histograms.counts,
+            self._histograms.used,
+            self.delay_counts,
+        )
+        return stop
 
     def order(self) -> SequenceFigures:
         """Return what is defined over sequence numbers."""
@@ -136,30 +147,32 @@ class FlowStatistics:
 
     def percentiles_ns(self, share: float) -> NDArray[np.float64]:
         """Return the delay that `share` of each flow's packets do not exceed."""
-        values = np.full(len(self._least_ns), np.nan)
-        for flow in np.flatnonzero(self.delivered):
-            delay_ns = self._least_ns[flow] + percentile_ns(self._bins[flow], share)
-            values[flow] = np.clip(delay_ns, self._delays[flow, _LEAST], self._delays[flow, _MOST])
-        return values
+        delays_ns = self._least_ns + self._histograms.percentiles_ns(share)
+        bounds = self._delays[:, _LEAST], self._delays[:, _MOST]
+        return self._where_delivered(np.clip(delays_ns, *bounds))
 
     def _where_delivered(self, values: NDArray[np.generic]) -> NDArray[np.float64]:
         return np.where(self.delivered > 0, values, np.nan)
 
 
-@compiled
+@compiled_from_zero
 def _add_delays(
+    start: int,
     flows: NDArray[np.int64],
     delays_ns: NDArray[np.int64],
     least_ns: NDArray[np.int64],
     delays: NDArray[np.int64],
     smoothed_ns: NDArray[np.float64],
+    block_of: NDArray[np.int32],
     bins: NDArray[np.uint32],
+    used: NDArray[np.int64],
     counts: NDArray[np.int64],
-) -> None:
-    for place in range(len(flows)):
+) -> int:
+    for place in range(start, len(flows)):
         flow = flows[place]
         delay_ns = delays_ns[place]
-        bins[flow, bin_of(delay_ns - least_ns[flow])] += 1
+        if not count(flow, delay_ns - least_ns[flow], block_of, bins, used):
+            return place
         counts[min(delay_ns // DELAY_BIN_NS, DELAY_BINS)] += 1
         if delays[flow, _COUNT] == 0:
             delays[flow, _LEAST] = delay_ns
@@ -171,3 +184,4 @@ def _add_delays(
         delays[flow, _LEAST] = min(delays[flow, _LEAST], delay_ns)
         delays[flow, _MOST] = max(delays[flow, _MOST], delay_ns)
         delays[flow, _LAST] = delay_ns
+    return len(flows)

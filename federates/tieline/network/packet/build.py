@@ -105,7 +105,8 @@ def laid_out(spec: NetworkSpec, supplies: Supplies) -> tuple[Memory, Changes, Ro
         "first_tree": routes.first_tree,
         "most_packets": most,
     }
-    return Memory(tables, _FIRST_CAPACITY + 4 * most, bounds), changes, routes
+    memory = Memory(tables, _FIRST_CAPACITY + 4 * most, bounds, bool(spec.taps))
+    return memory, changes, routes
 
 
 def _most_packets(spec: NetworkSpec, routes: Routes) -> int:

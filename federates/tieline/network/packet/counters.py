@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled_from_zero
 from tieline.network.engine import LINK_COUNTER
 from tieline.network.packet.events import FRAME, KIND_BITS, KINDS
 from tieline.network.packet.memory import (
@@ -42,7 +42,7 @@ def read_counters(now_ns: int, ports: int, cells: Cells, at: Layout) -> NDArray[
     return counters
 
 
-@compiled
+@compiled_from_zero
 def frames_announced(flows_of: Cells, cells: Cells, at: Layout) -> int:
     """Return in how many flows frames wait at their PMUs to enter; `flows_of` counts a source's."""
     waiting = 0
@@ -53,7 +53,7 @@ def frames_announced(flows_of: Cells, cells: Cells, at: Layout) -> int:
     return waiting
 
 
-@compiled
+@compiled_from_zero
 def _read(now_ns: int, counters: NDArray[np.void], cells: Cells, at: Layout) -> None:
     for number in range(len(counters)):
         port = at.ports + PORT_COLUMNS * number
@@ -68,7 +68,7 @@ def _read(now_ns: int, counters: NDArray[np.void], cells: Cells, at: Layout) -> 
         row["max_queue"] = cells[port + MAX_QUEUE]
 
 
-@compiled
+@compiled_from_zero
 def _waiting(now_ns: int, port: int, cells: Cells, at: Layout) -> int:
     """Return how many packets wait at a port: those whose start is still to come.
 

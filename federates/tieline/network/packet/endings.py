@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled_from_zero
 from tieline.network.engine import ARRIVAL, DELIVERED, DROP, NO_DROPS, Outcome, order_of
 from tieline.network.packet.memory import COLUMNS, END_FLOW, END_HOW, END_SEQUENCE, END_TIME
 from tieline.network.spec import NetworkSpec
@@ -74,7 +74,7 @@ class Endings:
         return Outcome(arrivals[:due], drops)
 
 
-@compiled
+@compiled_from_zero
 def _sort_out(
     rows: NDArray[np.int64],
     ends: NDArray[np.int64],
@@ -101,7 +101,7 @@ def _sort_out(
     return delivered
 
 
-@compiled
+@compiled_from_zero
 def _let_go(
     order: NDArray[np.int64],
     until_ns: int,

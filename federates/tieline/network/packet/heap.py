@@ -5,11 +5,11 @@ order) stands first, so that events of one instant come out by their order numbe
 gives without repeats.
 """
 
-from tieline.compiled import compiled, inlined
+from tieline.compiled import compiled_from_zero, inlined
 from tieline.network.packet.memory import HEAP_COLUMNS, ITEM, ORDER, TIME, Cells
 
 
-@compiled
+@compiled_from_zero
 def push(cells: Cells, heap: int, size: int, time_ns: int, order: int, item: int) -> None:
     """Add an event to a heap of `size` events; the table must have a row more than that."""
     place = size
@@ -22,7 +22,7 @@ def push(cells: Cells, heap: int, size: int, time_ns: int, order: int, item: int
     _write(cells, heap + HEAP_COLUMNS * place, time_ns, order, item)
 
 
-@compiled
+@compiled_from_zero
 def replace_first(cells: Cells, heap: int, size: int, time_ns: int, order: int, item: int) -> None:
     """Put an event in the place of the first and restore the order: a pop and a push in one."""
     place, row = 0, heap
@@ -47,7 +47,7 @@ def replace_first(cells: Cells, heap: int, size: int, time_ns: int, order: int, 
     _write(cells, row, time_ns, order, item)
 
 
-@compiled
+@compiled_from_zero
 def pop(cells: Cells, heap: int, size: int) -> None:
     """Remove the first of `size` events, leaving `size` - 1."""
     last = heap + HEAP_COLUMNS * (size - 1)

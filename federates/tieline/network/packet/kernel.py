@@ -5,7 +5,7 @@ from its tables in the order in which it needs them. It therefore computes the s
 and however its caller cuts the time into pieces.
 """
 
-from tieline.compiled import compiled, inlined
+from tieline.compiled import compiled_from_zero, inlined
 from tieline.network.engine import DELIVERED, LOSS
 from tieline.network.packet import tcp
 from tieline.network.packet.events import (
@@ -76,7 +76,7 @@ _FLOW, _SOURCE, _CROSS, _PACKET = (
 )
 
 
-@compiled
+@compiled_from_zero
 def run(until_ns: int, cells: Cells, at: Layout) -> int:
     """Process every event up to and including `until_ns`.
 
@@ -98,7 +98,7 @@ def run(until_ns: int, cells: Cells, at: Layout) -> int:
     return DONE
 
 
-@compiled
+@compiled_from_zero
 def step(cells: Cells, at: Layout) -> None:
     """Process the first event alone; there must be one, and room and draws for it."""
     _process_first(cells, at)
@@ -125,7 +125,7 @@ def _process_first(cells: Cells, at: Layout) -> None:
             _reply(now, number, cells, at)
 
 
-@compiled
+@compiled_from_zero
 def announce(times_ns: Cells, items: Cells, base_order: int, cells: Cells, at: Layout) -> None:
     """Add frames, or the first packets of cross flows, to the events; the heap must have room."""
     for place in range(len(times_ns)):
@@ -194,7 +194,7 @@ def _leave(slot: int, cells: Cells, at: Layout) -> None:
     cells[at.control + FREE_PACKETS] += 1
 
 
-@compiled
+@compiled_from_zero
 def _reach_target(now: int, flow: int, sequence: int, cells: Cells, at: Layout) -> None:
     """A packet that carries no PMU frame of its own reaches the end of its route."""
     row = at.cross + _CROSS * (flow - at.pmu_flows)
@@ -234,7 +234,7 @@ def _send_cross(now: int, number: int, cells: Cells, at: Layout) -> None:
     replace_first(cells, at.heap, events, next_ns, next_order(cells, at), item)
 
 
-@compiled
+@compiled_from_zero
 def _send_frame(now: int, code: int, cells: Cells, at: Layout) -> None:
     """A PMU sends one frame to each of its destinations, back to back in their order.
 

@@ -123,7 +123,8 @@ COLUMNS = {
     "ended": 4,
     "taps": 7,
 }
-GROWING = ("heap", "packets", "free", "ended", "taps")
+GROWING = ("heap", "packets", "free", "ended")
+"""The tables with a row for each packet that may be inside; with links tapped, `taps` is one."""
 
 HEAP_COLUMNS = COLUMNS["heap"]
 
@@ -174,13 +175,17 @@ class Memory:
             given have one row of zeros (`control`) or are empty.
         capacity: rows of the growing tables at first.
         bounds: the layout's counts, `source_count` to `most_packets`.
+        is_tapped: whether a link is listened to.
     """
 
-    def __init__(self, tables: dict[str, Cells], capacity: int, bounds: dict[str, int]) -> None:
+    def __init__(
+        self, tables: dict[str, Cells], capacity: int, bounds: dict[str, int], is_tapped: bool
+    ) -> None:
         self._bounds = bounds
         self._rows = {name: len(tables.get(name, ())) for name in COLUMNS}
         self._rows["control"] = 1
-        self._rows.update(dict.fromkeys(GROWING, capacity))
+        self._growing = (*GROWING, "taps") if is_tapped else GROWING
+        self._rows.update(dict.fromkeys(self._growing, capacity))
         self._allocate()
         for name, content in tables.items():
             self.table(name)[:] = content
@@ -236,7 +241,7 @@ class Memory:
                 "propagation times or the rate of the cross traffic"
             )
         contents = {name: self.table(name) for name in COLUMNS}
-        self._rows.update(dict.fromkeys(GROWING, 2 * old))
+        self._rows.update(dict.fromkeys(self._growing, 2 * old))
         self._allocate()
         for name, content in contents.items():
             self.table(name)[: len(content)] = content

@@ -1,6 +1,6 @@
 """How packets enter the network, are copied in it, and end."""
 
-from tieline.compiled import compiled, inlined
+from tieline.compiled import compiled_from_zero, inlined
 from tieline.network.engine import DELIVERED, LINK_DOWN, QUEUE_FULL
 from tieline.network.packet.events import ARRIVAL, item_of, next_order, push_event, take
 from tieline.network.packet.memory import (
@@ -55,7 +55,7 @@ def enter(now: int, flow: int, sequence: int, cells: Cells, at: Layout) -> None:
     enter_datagram(now, flow, sequence, cells[at.flows + _FLOW * flow + DATAGRAM], cells, at)
 
 
-@compiled
+@compiled_from_zero
 def enter_datagram(now: int, flow: int, sequence: int, size: int, cells: Cells, at: Layout) -> None:
     """A datagram (bytes, its header included) enters the network, in pieces if it must."""
     row = at.flows + _FLOW * flow
@@ -71,7 +71,7 @@ def enter_datagram(now: int, flow: int, sequence: int, size: int, cells: Cells, 
         part += 1
 
 
-@compiled
+@compiled_from_zero
 def copy_to_forks(
     now: int, flow: int, sequence: int, row: int, size: int, cells: Cells, at: Layout
 ) -> None:
@@ -85,7 +85,7 @@ def copy_to_forks(
             record_end(now, -1 - target, sequence, DELIVERED, cells, at)
 
 
-@compiled
+@compiled_from_zero
 def dropped(
     now: int, flow: int, sequence: int, hop: int, how: int, cells: Cells, at: Layout
 ) -> None:
@@ -100,7 +100,7 @@ def dropped(
             record_end(now, cells[at.members + member], sequence, how, cells, at)
 
 
-@compiled
+@compiled_from_zero
 def record_end(now: int, flow: int, sequence: int, how: int, cells: Cells, at: Layout) -> None:
     """Record how a PMU packet ended; a delivered one's time is when its controller can use it."""
     end_ns = now
@@ -137,7 +137,7 @@ def _start(
         copy_to_forks(now, flow, sequence, hop, size, cells, at)
 
 
-@compiled
+@compiled_from_zero
 def _put_on_link(
     now: int, flow: int, sequence: int, part: int, hop: int, size: int, cells: Cells, at: Layout
 ) -> None:

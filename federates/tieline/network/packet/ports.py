@@ -6,7 +6,7 @@ A port with a server (priorities, round robin, half duplex) has an event at each
 transmission, because only then it is known which packet is next.
 """
 
-from tieline.compiled import compiled, inlined
+from tieline.compiled import compiled_from_zero, inlined
 from tieline.network.packet.events import DEPARTURE, item_of, next_order, push_event, take
 from tieline.network.packet.memory import (
     BUSY,
@@ -95,7 +95,7 @@ def plan_of(hop: int, cells: Cells, at: Layout) -> int:
     return at.plans + _PLAN * cells[at.hops + hop]
 
 
-@compiled
+@compiled_from_zero
 def transmit(now: int, slot: int, hop: int, cells: Cells, at: Layout) -> int:
     """Return when the packet in `slot` reaches the end of the link, or one of the above.
 
@@ -119,7 +119,7 @@ def transmit(now: int, slot: int, hop: int, cells: Cells, at: Layout) -> int:
     return start_ns + service_ns + cells[port + PROPAGATION]
 
 
-@compiled
+@compiled_from_zero
 def depart(now: int, number: int, cells: Cells, at: Layout) -> None:
     """A port with a server has ended a transmission: the next packet starts, if one waits.
 
@@ -136,7 +136,7 @@ def depart(now: int, number: int, cells: Cells, at: Layout) -> None:
         push_event(arrival_ns, next_order(cells, at), item_of(0, slot), cells, at)
 
 
-@compiled
+@compiled_from_zero
 def link_bytes(slot: int, cells: Cells, at: Layout) -> int:
     """Return the bytes that a packet has on the link of its hop."""
     packet = at.packets + _PACKET * slot
@@ -218,7 +218,7 @@ def _wait(start_ns: int, size: int, port: int, cells: Cells, at: Layout) -> None
     cells[port + MAX_QUEUE] = max(cells[port + MAX_QUEUE], cells[port + WAITING])
 
 
-@compiled
+@compiled_from_zero
 def _transmit_special(now: int, slot: int, hop: int, cells: Cells, at: Layout) -> int:
     plan = plan_of(hop, cells, at)
     port = at.ports + PORT_COLUMNS * cells[plan + HOP_PORT]
@@ -254,7 +254,7 @@ def _transmit_special(now: int, slot: int, hop: int, cells: Cells, at: Layout) -
     return _reach(start_ns, service_ns, size, slot, port, cells, at)
 
 
-@compiled
+@compiled_from_zero
 def _reach(
     start_ns: int, service_ns: int, size: int, slot: int, port: int, cells: Cells, at: Layout
 ) -> int:
@@ -336,7 +336,7 @@ def _transmit_served(now: int, slot: int, hop: int, cells: Cells, at: Layout) ->
     return WAITS
 
 
-@compiled
+@compiled_from_zero
 def _serve(now: int, slot: int, port: int, cells: Cells, at: Layout) -> int:
     """A port with a server starts to transmit a packet; returns when that reaches the end."""
     hop = cells[at.packets + _PACKET * slot + HOP]

@@ -40,8 +40,11 @@ class Taps:
 
     def __init__(self, memory: Memory, routes: Routes) -> None:
         self._memory = memory
-        self._places = np.array(routes.places, dtype=np.int64)
-        self._carried = np.array(routes.carried, dtype=np.int64).reshape(-1, 2)
+        # Only what is listened to needs them, and a large network has many.
+        is_tapped = len(memory.table("taps")) > 0
+        self._places = np.array(routes.places if is_tapped else (), dtype=np.int64)
+        carried = np.array(routes.carried if is_tapped else (), dtype=np.int64)
+        self._carried = carried.reshape(-1, 2)
         self._first_tree = routes.first_tree
         self._rows = np.empty((0, COLUMNS["taps"]), dtype=np.int64)
         self._new: list[NDArray[np.int64]] = []

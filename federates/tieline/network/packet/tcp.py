@@ -10,7 +10,7 @@ acknowledgement, Nagle's rule (a frame is sent at once), a receiver that is slow
 Windows are kept in 1/1024 segments, times in nanoseconds.
 """
 
-from tieline.compiled import compiled, inlined
+from tieline.compiled import compiled_from_zero, inlined
 from tieline.network.engine import DELIVERED, QUEUE_FULL
 from tieline.network.packet.events import TIMER, item_of, next_order, push_event
 from tieline.network.packet.memory import (
@@ -62,7 +62,7 @@ def begin_or_end(now: int, connection: int, cells: Cells, at: Layout) -> None:
         cells[row + AVAILABLE] = cells[row + SENT_SO_FAR]
 
 
-@compiled
+@compiled_from_zero
 def write(now: int, connection: int, frame: int, cells: Cells, at: Layout) -> None:
     """A PMU hands over a frame; it is dropped if the send buffer is full."""
     row = at.connections + CONNECTION_COLUMNS * connection
@@ -74,7 +74,7 @@ def write(now: int, connection: int, frame: int, cells: Cells, at: Layout) -> No
     _send_what_fits(now, connection, cells, at)
 
 
-@compiled
+@compiled_from_zero
 def on_packet(now: int, flow: int, connection: int, number: int, cells: Cells, at: Layout) -> None:
     """A segment, or an acknowledgement, reaches its end."""
     row = at.connections + CONNECTION_COLUMNS * connection
@@ -84,7 +84,7 @@ def on_packet(now: int, flow: int, connection: int, number: int, cells: Cells, a
         _on_acknowledgement(now, number, connection, cells, at)
 
 
-@compiled
+@compiled_from_zero
 def on_timer(now: int, connection: int, cells: Cells, at: Layout) -> None:
     """The event of a retransmission timer: late, early, or the end of it."""
     row = at.connections + CONNECTION_COLUMNS * connection
@@ -205,7 +205,7 @@ def _send_again(now: int, connection: int, cells: Cells, at: Layout) -> None:
     enter(now, cells[row + DATA_FLOW], cells[row + UNACKNOWLEDGED], cells, at)
 
 
-@compiled
+@compiled_from_zero
 def _send_what_fits(now: int, connection: int, cells: Cells, at: Layout) -> None:
     """Send what there is as far as the window reaches."""
     row = at.connections + CONNECTION_COLUMNS * connection
@@ -227,7 +227,7 @@ def _send_what_fits(now: int, connection: int, cells: Cells, at: Layout) -> None
         _plan_timer(cells[row + DEADLINE], connection, cells, at)
 
 
-@compiled
+@compiled_from_zero
 def _plan_timer(deadline: int, connection: int, cells: Cells, at: Layout) -> None:
     """See to it that the timer's event comes no later than it ends."""
     row = at.connections + CONNECTION_COLUMNS * connection
