@@ -4,6 +4,7 @@ import os
 import shutil
 import socket
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -140,6 +141,8 @@ def _save_incomplete(
         save_manifest(work, ended(base, run_facts(outcome, work), reason_of(error)))
     except (OSError, TielineError) as second:
         error.add_note(f"what was written could not all be made readable: {second}")
+        with suppress(OSError):
+            save_manifest(work, ended(base, {}, reason_of(error)))
 
 
 def run_task(work: Path, task: Task, launch: Launch, on_time: OnTime | None = None) -> None:
