@@ -1,5 +1,6 @@
 """Result tables: what is written is read back, and what a killed process wrote stays readable."""
 
+import errno
 from pathlib import Path
 
 import numpy as np
@@ -8,13 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tieline.errors import CosimError
 from tieline.tables import (
     Column,
     TableStream,
     column_names,
+    last_value,
     metadata_of,
     read_table,
+    readable_tables,
     salvage,
+    stored,
     units_of,
     write_table,
 )
@@ -204,3 +209,51 @@ def test_a_long_table_is_read_in_groups_and_by_columns(tmp_path: Path) -> None:
     only = read_table(tmp_path / "wide.parquet", ["k"])
     assert list(only.columns) == ["k"]
     assert np.array_equal(only["k"], np.arange(45_000))
+
+
+def no_room(*_: object, **__: object) -> None:
+    """Answer as a full disk does."""
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_stream_that_finds_no_room_as_parquet_is_read_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Otherwise a full disk would take what was written while there was room."""
+    stream = TableStream(tmp_path / "grid.parquet", [Column("t_s", "s", "time")])
+    stream.append({"t_s": np.arange(10.0)})
+    stream.flush()
+    monkeypatch.setattr(pq, "ParquetWriter", no_room)
+    with pytest.raises(CosimError, match=r"grid\.parquet cannot be written: No space left"):
+        stream.close()
+    assert salvage(tmp_path) == []
+    [path] = readable_tables(tmp_path)
+    assert path == stored(tmp_path / "grid.parquet") == tmp_path / "grid.arrows"
+    assert list(read_table(path, ["t_s"])["t_s"]) == list(range(10))
+    assert (column_names(path), units_of(path)) == (["t_s"], {"t_s": ("s", "time")})
+    assert last_value(path, "t_s") == 9.0
+
+
+def test_a_table_takes_nothing_after_a_batch_that_found_no_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Otherwise rows would follow half a batch, and nothing after it could be read."""
+    stream = TableStream(tmp_path / "grid.parquet", [Column("t_s", "s", "time")])
+    stream.append({"t_s": np.arange(10.0)})
+    stream.flush()
+    whole_bytes = (tmp_path / "grid.arrows").stat().st_size
+
+    class Full:
+        def write_batch(self, batch: object) -> None:
+            with (tmp_path / "grid.arrows").open("ab") as file:
+                file.write(b"half a batch")
+            no_room()
+
+    monkeypatch.setattr(stream, "_writer", Full())
+    stream.append({"t_s": np.arange(3.0)})
+    with pytest.raises(CosimError, match="No space left on device"):
+        stream.flush()
+    assert (tmp_path / "grid.arrows").stat().st_size == whole_bytes
+    stream.close()
+    [path] = salvage(tmp_path)
+    assert len(read_table(path)) == 10

@@ -19,6 +19,7 @@ pytestmark = pytest.mark.helics
 
 SLOW = {"grid": {"pause_s": 0.02}, "network": {"pause_s": 0.02, "pause_seed": 1}}
 ENDLESS = 100_000
+PATIENCE_S = 60.0
 
 
 def run_pair(
@@ -129,7 +130,7 @@ def test_a_participant_that_raises_is_named_and_both_are_saved(tmp_path: Path, c
     assert failure.outcome.granted_ns["network"] == 166_667_666
     assert (tmp_path / "grid.aborted").exists()
     assert (tmp_path / "network.aborted").exists()
-    assert took_s < 10
+    assert took_s < PATIENCE_S
 
 
 @pytest.mark.parametrize("core", ["zmq", "inproc"])
@@ -139,7 +140,7 @@ def test_a_participant_that_does_not_open_is_named(tmp_path: Path, core: str) ->
     failure, took_s = fail_run(tmp_path)
     assert failure.federate == "grid"
     assert "told not to open" in str(failure)
-    assert took_s < 10
+    assert took_s < PATIENCE_S
 
 
 def test_an_end_marker_that_does_not_fit_fails_the_run(tmp_path: Path) -> None:
@@ -156,7 +157,7 @@ def test_a_federate_that_exits_by_itself_is_named_with_its_code(tmp_path: Path) 
     failure, took_s = fail_run(tmp_path)
     assert failure.federate == "grid"
     assert "exit code 7" in str(failure)
-    assert took_s < 10
+    assert took_s < PATIENCE_S
 
 
 def test_a_federate_that_hangs_is_named(tmp_path: Path) -> None:
@@ -167,7 +168,7 @@ def test_a_federate_that_hangs_is_named(tmp_path: Path) -> None:
     failure, took_s = fail_run(tmp_path)
     assert failure.federate == "network"
     assert "hung" in str(failure)
-    assert took_s < 15
+    assert took_s < PATIENCE_S
 
 
 def test_a_federate_that_never_starts_is_named(tmp_path: Path) -> None:
@@ -177,7 +178,7 @@ def test_a_federate_that_never_starts_is_named(tmp_path: Path) -> None:
     assert failure.federate == "network"
     assert "has not joined the federation" in str(failure)
     assert "no process worked" in str(failure)
-    assert took_s < 15
+    assert took_s < PATIENCE_S
 
 
 def test_slow_opening_is_no_hang(tmp_path: Path) -> None:

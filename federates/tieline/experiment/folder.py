@@ -15,6 +15,8 @@ from tieline.errors import InputError
 MANIFEST = "manifest.json"
 FORMAT = "tieline-result/1"
 UNDER_WAY = "the run did not end: it is under way, or was killed"
+RESERVE = ".reserve"
+"""Keeps room for the manifest, and for small tables, on a disk that runs full."""
 OLDER = ".older"
 """Ends the name of an earlier result on its way out, where two folders cannot change places."""
 
@@ -115,6 +117,13 @@ def place_of_incomplete(place: Path) -> Path:
     """Return where an incomplete result belongs: it overwrites nothing whole."""
     has_whole = is_result(place) and read_json(place / MANIFEST).get("status") == "complete"
     return place.with_name(f"{place.name}-incomplete") if has_whole else place
+
+
+def clear(folder: Path) -> None:
+    """Remove what is nothing without the process that was writing it: half-written files."""
+    for path in folder.rglob(".*.part"):
+        path.unlink(missing_ok=True)
+    (folder / RESERVE).unlink(missing_ok=True)
 
 
 @contextmanager

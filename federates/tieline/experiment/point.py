@@ -4,6 +4,7 @@ import os
 import shutil
 import socket
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,14 @@ from typing import Any
 import tieline
 from tieline.cosim.interfaces import GRID
 from tieline.errors import CosimError, InputError, TielineError
-from tieline.experiment.folder import MANIFEST, UNDER_WAY, put_in_place, write_json
+from tieline.experiment.folder import (
+    MANIFEST,
+    RESERVE,
+    UNDER_WAY,
+    clear,
+    put_in_place,
+    write_json,
+)
 from tieline.experiment.interrupts import current_interrupts, interruptible
 from tieline.experiment.launch import Outcome
 from tieline.experiment.manifest import ended, run_facts, run_manifest, save_manifest, versions
@@ -23,9 +31,7 @@ from tieline.experiment.watch import Progress
 from tieline.tables import salvage
 from tieline.units import ns_to_seconds
 
-_RESERVE = ".reserve"
 _RESERVE_BYTES = 262_144
-"""Room for the manifest, and for small tables, that is kept free on a disk that runs full."""
 
 Launch = Callable[[Path, Callable[[Progress], None]], Outcome]
 """Runs the federation of a folder's run.json to its end, or raises a CosimError."""
@@ -94,7 +100,7 @@ def run_in(
         outcome = launch(work, report)
         facts = run_facts(outcome, work, base["seed"])
         write_json(work / SUMMARY, summarise(Run(work, ended(base, facts, None))))
-        (work / _RESERVE).unlink()
+        (work / RESERVE).unlink()
         save_manifest(work, ended(base, facts, None))
     except BaseException as error:
         own = _own(error, outcome)
@@ -109,7 +115,7 @@ def _begin(work: Path, task: Task, base: Mapping[str, Any]) -> None:
     for name, content in task.files.items():
         write_json(work / name, content)
     save_manifest(work, base)
-    (work / _RESERVE).write_bytes(bytes(_RESERVE_BYTES))
+    (work / RESERVE).write_bytes(bytes(_RESERVE_BYTES))
 
 
 def _own(error: BaseException, outcome: Outcome | None) -> BaseException:
@@ -125,17 +131,19 @@ def _save_incomplete(
     work: Path, base: Mapping[str, Any], outcome: Outcome | None, error: BaseException
 ) -> None:
     """Make readable what was written, and say in the manifest why it is not whole."""
-    reserve = work / _RESERVE
+    reserve = work / RESERVE
     try:
         if reserve.is_file():
             # The manifest keeps its part: tables could take all the room there is.
             os.truncate(reserve, _RESERVE_BYTES // 2)
         salvage(work)
-        reserve.unlink(missing_ok=True)
+        clear(work)
         facts = run_facts(outcome, work, base["seed"])
         save_manifest(work, ended(base, facts, reason_of(error)))
     except (OSError, TielineError) as second:
         error.add_note(f"what was written could not all be made readable: {second}")
+        with suppress(OSError):
+            save_manifest(work, ended(base, {}, reason_of(error)))
 
 
 def run_task(work: Path, task: Task, launch: Launch, on_time: OnTime | None = None) -> None:
@@ -202,8 +210,8 @@ def mark_lost(work: Path, task: Task, reason: str) -> None:
     if not (work / MANIFEST).is_file():
         shutil.rmtree(work, ignore_errors=True)
         return
-    (work / _RESERVE).unlink(missing_ok=True)
     salvage(work)
+    clear(work)
     facts = run_facts(None, work, task.manifest["seed"])
     save_manifest(work, ended(task.manifest, facts, reason))
     put(work, Path(task.folder))

@@ -17,6 +17,7 @@ from tieline.experiment.folder import (
     MANIFEST,
     OLDER,
     UNDER_WAY,
+    clear,
     held,
     is_result,
     place_of_incomplete,
@@ -65,7 +66,7 @@ def rescue(
         if not is_result(work) or _was_replaced(work, place):
             shutil.rmtree(work, ignore_errors=True)
             return None
-        _clear(work)
+        clear(work)
         manifest = dict(read_manifest(work))
         if manifest["reason"] == UNDER_WAY:
             manifest |= {"reason": reason, "granted_ns": dict(granted_ns or {})}
@@ -130,13 +131,6 @@ def _restore(older: Path, place: Path) -> None:
         shutil.rmtree(older, ignore_errors=True)
     else:
         older.rename(place)
-
-
-def _clear(folder: Path) -> None:
-    """Remove what is nothing without the process that was writing it."""
-    for path in folder.rglob(".*"):
-        if path.is_file():
-            path.unlink()
 
 
 def _tables(folder: Path) -> dict[str, Any]:
