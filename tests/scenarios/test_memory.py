@@ -30,8 +30,8 @@ EARLY_S, LATE_S = 1, 4
 RATE_HZ = 60
 
 MOST_BYTES_MORE = 200_000
-"""What may be held more after 4 s than after 1 s: less than a third of the smallest of the tables
-that are streamed meanwhile, and 1/100 of the packets' own."""
+"""What may be held more after 4 s than after 1 s: caches of small things; any table that were kept
+in memory would take more. The test asserts that it is below a tenth of what is stored."""
 
 
 class Gauge:
