@@ -138,6 +138,15 @@ def test_only_the_worker_of_the_reproduction_holds_federates() -> None:
             assert not begins(names, "tieline.cosim.local", "tieline.paper.worker"), path
 
 
+def test_what_keeps_logs_knows_nothing_of_a_run() -> None:
+    """A federate that logs would otherwise bring the launcher with it, and the tables' readers."""
+    allowed = ("errors", "logs", "units")
+    for path in part("logs"):
+        known = begins(imports(path), *(f"tieline.{name}" for name in allowed))
+        assert begins(imports(path), "tieline") <= known, path
+        assert not begins(imports(path), "numpy", "pandas", "pyarrow"), path
+
+
 def test_floats_and_nanoseconds_meet_in_units_alone() -> None:
     """A second conversion is a second rounding."""
     conversion = re.compile(r"[*/]\s*1e-?9\b")

@@ -184,7 +184,7 @@ def federation() -> Finding:
         with tempfile.TemporaryDirectory() as folder:
             manifest = read_manifest(execute(plan, Path(folder) / "run", launch))
     except TielineError as error:
-        advice = f"tieline run {FEDERATION} --debug, and look at its logs/"
+        advice = f"tieline run {FEDERATION} --debug, then tieline doctor --last"
         return Finding(name, "fail", str(error).splitlines()[0], advice)
     wall_s = manifest["times"]["wall_s"]
     return Finding(name, "ok", f"broker, grid and network over zmq: 2 s in {wall_s:.1f} s")
