@@ -32,7 +32,7 @@ HERE = Path(__file__).resolve().parent
 PAIR, INJECT = HERE / "helics_pair", HERE / "helics_pair" / "inject"
 RUNNER = HERE.parent / "runner.py"
 PROGRAMS = Path(sys.executable).parent
-CAP_S, START_S = 60.0, 90.0
+CAP_S, START_S = 60.0, 240.0
 LONG_S, SHORT_S = 400, 4
 MARK = "HELICS_FAULTS_RUN"
 
