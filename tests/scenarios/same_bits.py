@@ -118,6 +118,13 @@ def say(*words: str, file: TextIO = sys.stdout) -> None:
     file.flush()
 
 
+def save(path: Path | None, trials: list[dict[str, Any]], differences: dict[str, float]) -> None:
+    """Write down what there is, if a file is given."""
+    report = {"python": platform.python_version(), "trials": trials, "compiler_off": differences}
+    if path is not None:
+        path.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+
+
 def main() -> int:
     """Run the matrix, print the table, and return 0 if every promise held."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -131,15 +138,15 @@ def main() -> int:
         return 0
     trials = []
     with TemporaryDirectory(prefix="same-bits-") as name:
-        for core in CORES:
-            for number in range(asked.repeats):
+        for number in range(asked.repeats):
+            for core in CORES:
                 folder = Path(name) / f"{core}-{number}"
                 trials.append(trial(core, number, asked.duration, folder))
-                say("#", json.dumps(trials[-1] | {"tables": "..."}), file=sys.stderr)
+                is_equal = trials[-1]["tables"] == trials[0]["tables"]
+                say("#", json.dumps(trials[-1] | {"tables": is_equal}), file=sys.stderr)
+                save(asked.json, trials, {})
         differences = without_compiler(Path(name))
-    report = {"python": platform.python_version(), "trials": trials, "compiler_off": differences}
-    if asked.json:
-        asked.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    save(asked.json, trials, differences)
     expected = trials[0]["tables"]
     say("| core | repeats | one processor | network first | equal to the first run |")
     say("|---|---|---|---|---|")

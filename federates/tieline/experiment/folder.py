@@ -5,6 +5,7 @@ import fcntl
 import json
 import os
 import shutil
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,6 +27,8 @@ _OF_KIND: dict[str, dict[str, type]] = {
     "sweep": {"points": list},
 }
 """What the readers take from a manifest of each kind, whoever made it."""
+
+_LONGEST_WAIT_S, _LOOK_S = 2.0, 0.01
 
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2
@@ -146,6 +149,27 @@ def held(folder: Path) -> Iterator[bool]:
         yield is_free
     finally:
         os.close(descriptor)
+
+
+@contextmanager
+def waited_for(folder: Path) -> Iterator[None]:
+    """Hold a folder for an instant; wait a little while another does so."""
+    limit_s = time.monotonic() + _LONGEST_WAIT_S
+    while True:
+        with held(folder) as free:
+            if free or time.monotonic() > limit_s:
+                yield
+                return
+        time.sleep(_LOOK_S)
+
+
+def is_free(folder: Path) -> bool:
+    """Return whether nobody holds a folder; one that is gone is free."""
+    try:
+        with held(folder) as free:
+            return free
+    except OSError:
+        return True
 
 
 def _exchange(one: Path, other: Path) -> bool:

@@ -3,17 +3,20 @@
 import itertools
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from datetime import datetime
 from pathlib import Path
 
 from tieline.errors import InputError, TielineError
 from tieline.experiment.folder import (
     held,
+    is_free,
     is_result,
     place_of_incomplete,
     put_in_place,
     read_manifest,
+    waited_for,
 )
 from tieline.experiment.interrupts import interruptible
 from tieline.experiment.keeper import kept
@@ -83,7 +86,7 @@ def execute(
         on_progress: is told the point and the simulated time that it has reached, s.
 
     Raises:
-        InputError: the target is not free, or cannot be written.
+        InputError: the target is not free, another run is under way to it, or it cannot be written.
         RunFailedError: a run failed.
     """
     check_target(target)
@@ -96,21 +99,23 @@ def execute(
         if on_progress is not None:
             on_progress(plan.runs[0].point, time_s)
 
-    with interruptible() as interrupts:
-        work = _work_folder(target)
-        with held(work), kept(work.resolve(), target.resolve()) as keeper:
-            try:
-                run_in(work, task, launch, on_time, keeper.note)
-            except TielineError as error:
-                with interrupts.hold():
-                    folder = _keep_incomplete(work, target)
-                raise RunFailedError(error, folder) from error
-            except BaseException:
-                with interrupts.hold():
-                    _keep_incomplete(work, target)
-                raise
+    with (
+        interruptible() as interrupts,
+        _own_folder(target) as work,
+        kept(work.resolve(), target.resolve()) as keeper,
+    ):
+        try:
+            run_in(work, task, launch, on_time, keeper.note)
+        except TielineError as error:
             with interrupts.hold():
-                put_in_place(work, target)
+                folder = _keep_incomplete(work, target)
+            raise RunFailedError(error, folder) from error
+        except BaseException:
+            with interrupts.hold():
+                _keep_incomplete(work, target)
+            raise
+        with interrupts.hold():
+            put_in_place(work, target)
     return target
 
 
@@ -121,6 +126,30 @@ def _work_folder(target: Path) -> Path:
     except OSError as error:
         raise InputError(f"--out {target} cannot be written ({error.strerror})") from error
     return work
+
+
+@contextmanager
+def _own_folder(target: Path) -> Iterator[Path]:
+    """Make and hold the folder in which a run is written; give it while no other run has one.
+
+    Raises:
+        InputError: another run is under way to the same target, or it cannot be written there.
+    """
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out {target} cannot be written ({error.strerror})") from error
+    with ExitStack() as stack:
+        with waited_for(target.parent):
+            for other in target.parent.glob(f".{target.name}.partial-*"):
+                if not is_free(other):
+                    raise InputError(
+                        f"--out {target}: another run is under way there ({other.name}); give"
+                        " another folder, or wait for its end"
+                    )
+            work = _work_folder(target)
+            stack.enter_context(held(work))
+        yield work
 
 
 def _keep_incomplete(work: Path, target: Path) -> Path:
