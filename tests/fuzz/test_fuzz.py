@@ -19,10 +19,14 @@ from tieline.c37118.data import DataFrame, PmuData
 from tieline.c37118.prefix import Prefix
 from tieline.errors import InputError
 from tieline.experiment.load import load_experiment
+from tieline.experiment.plan import prepare
 from tieline.experiment.results import read_runs
 from tieline.grid.case import load_case
+from tieline.network.jitter.empirical import read_sample
+from tieline.network.path_delays import read_trace as read_delays
 from tieline.network.settings import NetworkSettings
 from tieline.network.topology import read_topology
+from tieline.network.traffic.trace import read_trace
 
 INPUTS = st.binary(min_size=2, max_size=120)
 
@@ -106,17 +110,45 @@ def test_a_number_among_the_keys_of_a_group_is_refused(tmp_path: Path) -> None:
         load_experiment(str(tmp_path / "x.yaml"))
 
 
-@pytest.mark.parametrize("written", ["a\\0b", "../../..", "/dev/zero", "x" * 5_000])
-def test_strange_paths_are_refused_wherever_one_may_stand(tmp_path: Path, written: str) -> None:
-    """A NUL, a device or a name without end must not reach the operating system as it is."""
-    for entry in (
-        f'extends: "{written}"',
-        f'extends: g26_trip_smoke\nnetwork: {{engine: empirical, empirical: {{trace: "{written}"}}}}',
-        f'extends: g26_trip_smoke\ngrid: {{pss: {{file: "{written}"}}}}',
-    ):
-        (tmp_path / "x.yaml").write_text(f"name: x\n{entry}\n")
-        with pytest.raises(InputError):
-            load_experiment(str(tmp_path / "x.yaml"))
+ENTRIES = (
+    'extends: "{}"',
+    'extends: g26_trip_smoke\ncase: "{}"',
+    'extends: g26_trip_smoke\nnetwork: {{topology: "{}"}}',
+    'extends: g26_trip_smoke\nnetwork: {{engine: empirical, empirical: {{trace: "{}"}}}}',
+    'extends: g26_trip_smoke\ngrid: {{pss: {{file: "{}"}}}}',
+    "extends: g26_trip_smoke\n"
+    'network: {{traffic: [{{kind: trace, from: S101, to: S105, file: "{}"}}]}}',
+)
+
+
+@pytest.mark.parametrize("name", ["a\\0b", "../../..", "/dev/zero", "x" * 5_000], ids=range(4))
+@pytest.mark.parametrize("entry", ENTRIES, ids=range(len(ENTRIES)))
+def test_strange_paths_are_refused_wherever_one_may_stand(
+    tmp_path: Path, entry: str, name: str
+) -> None:
+    """A long name ended in a traceback, and `/dev/zero` as a trace was read until memory ended."""
+    (tmp_path / "x.yaml").write_text("name: x\n" + entry.format(name) + "\n")
+    with pytest.raises(InputError):
+        prepare(load_experiment(str(tmp_path / "x.yaml")))
+
+
+def test_a_device_in_the_place_of_a_file_is_refused(tmp_path: Path) -> None:
+    """A symbolic link to a device has no end."""
+    for name in ("case.yaml", "bus.csv"):
+        (tmp_path / name).symlink_to("/dev/zero")
+    with pytest.raises(InputError, match=r"bus.csv: cannot be read \(it is a device or a pipe\)"):
+        load_case(tmp_path)
+
+
+@pytest.mark.parametrize("read", [read_trace, read_sample, lambda p: read_delays(p, [], [])])
+def test_a_table_with_an_endless_cell_is_refused(tmp_path: Path, read: Callable) -> None:
+    """Python's reader of tables gives up at 131,072 characters, with an error of its own."""
+    path = tmp_path / "x.csv"
+    path.write_text("time_s,payload_bytes,delay_s\n" + "1" * 200_000 + ",1,1\n")
+    if read not in (read_trace, read_sample):
+        path.write_text("delay_s\n" + "1" * 200_000 + "\n")
+    with pytest.raises((InputError, ValueError), match="field larger than field limit"):
+        read(path)
 
 
 @pytest.mark.parametrize("content", [b"name: \xff\xfe\n", b"name: a\0b\n", b"\xed\xa0\x80: 1\n"])
