@@ -15,6 +15,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import ArrayLike, NDArray
 
+from tieline.errors import NumericalError
+
 _STREAM_SUFFIX = ".arrows"
 _VALUES_PER_BATCH = 131_072
 _MOST_ROWS_PER_BATCH = 32_768
@@ -108,9 +110,15 @@ class TableStream:
         _to_parquet(self._stream_path, self.path)
 
     def _write_batch(self) -> None:
+        """Write what is gathered.
+
+        Raises:
+            NumericalError: a value is infinite.
+        """
         arrays = {name: buffer[: self._filled] for name, buffer in self._buffers.items()}
-        self._writer.write_batch(_batch(self._schema, arrays))
+        # Whatever comes of it, these rows are done with: a table is also closed after a failure.
         self._filled = 0
+        self._writer.write_batch(_batch(self.path, self._schema, arrays))
 
 
 def salvage(folder: Path) -> list[Path]:
@@ -133,6 +141,7 @@ def write_table(path: Path, columns: Sequence[Column], data: Mapping[str, ArrayL
     Raises:
         ValueError: a column is missing or unknown, or the lengths differ.
         TypeError: values cannot be stored in their column without losing their kind.
+        NumericalError: a value is infinite.
     """
     schema = _schema_of(columns, None)
     arrays = {
@@ -145,7 +154,7 @@ def write_table(path: Path, columns: Sequence[Column], data: Mapping[str, ArrayL
     extra = {name: np.asarray(values) for name, values in data.items() if name not in arrays}
     _common_length(path, dict.fromkeys(schema.names), {**arrays, **extra})
     part = _part_of(path)
-    pq.write_table(pa.Table.from_batches([_batch(schema, arrays)]), part, compression="zstd")
+    pq.write_table(pa.Table.from_batches([_batch(path, schema, arrays)]), part, compression="zstd")
     part.replace(path)
 
 
@@ -197,7 +206,14 @@ def _arrow_type(dtype: str) -> pa.DataType:
     return pa.string() if dtype == "str" else pa.from_numpy_dtype(np.dtype(dtype))
 
 
-def _batch(schema: pa.Schema, arrays: Mapping[str, NDArray[np.generic]]) -> pa.RecordBatch:
+def _batch(
+    path: Path, schema: pa.Schema, arrays: Mapping[str, NDArray[np.generic]]
+) -> pa.RecordBatch:
+    for name, values in arrays.items():
+        if values.dtype.kind == "f" and np.isinf(values).any():
+            row = int(np.argmax(np.isinf(values)))
+            when = f" at t = {arrays['t_s'][row]} s" if "t_s" in arrays else f" in row {row}"
+            raise NumericalError(f"{path.name}: {name} is not finite ({values[row]}){when}")
     columns = [pa.array(arrays[field.name], field.type, from_pandas=True) for field in schema]
     return pa.RecordBatch.from_arrays(columns, schema=schema)
 

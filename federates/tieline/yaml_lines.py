@@ -172,7 +172,9 @@ class _Reader:
         except ValueError as error:
             raise self.refusal(node, f"'{node.value:.60}' is malformed ({error})") from error
         if isinstance(value, int) and value.bit_length() > _MAX_BITS:
-            raise self.refusal(node, f"'{node.value:.60}' is a whole number beyond {_MAX_BITS} bits")
+            raise self.refusal(
+                node, f"'{node.value:.60}' is a whole number beyond {_MAX_BITS} bits"
+            )
         return value
 
     def refusal(self, node: yaml.Node, reason: str) -> InputError:

@@ -57,7 +57,9 @@ def test_what_the_contract_allows_passes(rows: list[Row]) -> None:
 
 
 @given(deliveries, st.data())
-def test_deliveries_in_another_order_break_the_contract(rows: list[Row], data: st.DataObject) -> None:
+def test_deliveries_in_another_order_break_the_contract(
+    rows: list[Row], data: st.DataObject
+) -> None:
     """The newest frame wins; in another order, another one might be the last."""
     other = data.draw(st.permutations(rows))
     if other == rows:
@@ -88,9 +90,7 @@ def test_one_spoilt_delivery_among_sound_ones_is_found(
 
 
 @given(deliveries, st.data())
-def test_a_packet_delivered_twice_breaks_the_contract(
-    rows: list[Row], data: st.DataObject
-) -> None:
+def test_a_packet_delivered_twice_breaks_the_contract(rows: list[Row], data: st.DataObject) -> None:
     """A network that doubles packets would be taken for one that delivers more than it got."""
     again = data.draw(st.sampled_from(rows))
     later_ns = data.draw(st.integers(again[0], T2_NS))

@@ -114,7 +114,10 @@ def _any_config(script: Script) -> ConfigFrame:
 
 @functools.cache
 def _config(form: FormatBit, bare: bool = False) -> ConfigFrame:
-    phasors = (PhasorChannel("VA", scale=10_000), PhasorChannel("I1", is_current=True, scale=10_000))
+    phasors = (
+        PhasorChannel("VA", scale=10_000),
+        PhasorChannel("I1", is_current=True, scale=10_000),
+    )
     analogs = (AnalogChannel("ANALOG1", 1, -5),)
     digitals = (DigitalWord(tuple(f"BREAKER {i}" for i in range(16)), 3, 0xFF),)
     pmu = PmuConfig("Station A", 7, form, phasors, analogs, digitals)

@@ -17,7 +17,13 @@ os.environ["TIELINE_COMPILER"] = "off"
 import atheris  # noqa: E402
 
 TARGETS = ("experiments", "cases", "topologies", "frames", "payloads", "results")
-DEFAULTS = ("-max_total_time=300", "-len_control=0", "-max_len=2048", "-timeout=30", "-rss_limit_mb=3000")
+DEFAULTS = (
+    "-max_total_time=300",
+    "-len_control=0",
+    "-max_len=2048",
+    "-timeout=30",
+    "-rss_limit_mb=3000",
+)
 
 
 def main() -> None:

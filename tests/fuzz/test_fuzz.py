@@ -73,9 +73,7 @@ def test_a_file_may_be_as_deep_as_anybody_writes_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("number", ["0x" + "f" * 5_000, "1:" * 2_000 + "1", "-0b" + "1" * 20_000])
-def test_a_whole_number_that_cannot_even_be_printed_is_refused(
-    tmp_path: Path, number: str
-) -> None:
+def test_a_whole_number_that_cannot_even_be_printed_is_refused(tmp_path: Path, number: str) -> None:
     """Python does not print integers of some thousand digits, so the message itself failed."""
     path = tmp_path / "huge.yaml"
     path.write_text(f"name: x\nseed: {number}\n")
