@@ -14,7 +14,7 @@ from pathlib import Path
 # Compiled functions cannot be followed, and the bytecode that atheris rewrites not compiled.
 os.environ["TIELINE_COMPILER"] = "off"
 
-import atheris  # noqa: E402
+import atheris
 
 TARGETS = ("experiments", "cases", "topologies", "frames", "payloads", "results")
 DEFAULTS = (

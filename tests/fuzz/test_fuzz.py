@@ -3,21 +3,25 @@
 What the longer searches have found stands here, too, in plain words.
 """
 
+import socket
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fuzz import cases, experiments, frames, payloads, results, topologies
 from tieline import yaml_lines
+from tieline.c37118.batch import Verdict, decode_frames, encode_frames
 from tieline.c37118.config import ConfigFrame, PhasorChannel, PmuConfig
 from tieline.c37118.constants import FormatBit
 from tieline.c37118.data import DataFrame, PmuData
 from tieline.c37118.prefix import Prefix
-from tieline.errors import InputError
+from tieline.errors import CosimError, InputError
+from tieline.experiment.desk import Wire
 from tieline.experiment.load import load_experiment
 from tieline.experiment.plan import prepare
 from tieline.experiment.results import read_runs
@@ -27,6 +31,7 @@ from tieline.network.path_delays import read_trace as read_delays
 from tieline.network.settings import NetworkSettings
 from tieline.network.topology import read_topology
 from tieline.network.traffic.trace import read_trace
+from tieline.wams import WideAreaAverage
 
 INPUTS = st.binary(min_size=2, max_size=120)
 
@@ -180,11 +185,34 @@ def test_a_polar_phasor_with_an_infinite_angle_is_no_measurement(angle: float) -
     pmu = PmuConfig("Station A", 7, form, (PhasorChannel("VA"),))
     config = ConfigFrame(Prefix(7, 0, 0), (pmu,), 60)
     sound = DataFrame(Prefix(7, 0, 0), (PmuData(0, (1 + 0j,), 60.0, 0.0),)).to_bytes(config)
-    words = frames.np.array([1.0, angle], ">f4").tobytes()
+    words = np.array([1.0, angle], ">f4").tobytes()
     spoilt = sound[:16] + words + sound[24:-2]
     spoilt += frames.crc_of(spoilt).to_bytes(2, "big")
     [phasor] = DataFrame.from_bytes(spoilt, config).pmus[0].phasors
     assert phasor != phasor
+
+
+def test_a_signalling_nan_is_no_frequency() -> None:
+    """Any bits may stand where a frequency is; NumPy warns of these when it widens them."""
+    row = encode_frames([7], 0, np.ones(1), 60.0, 0.0)
+    row[0, 24:28] = (0x7F, 0x80, 0, 1)
+    row[0, -2:] = np.frombuffer(frames.crc_of(row[0, :-2].tobytes()).to_bytes(2, "big"), np.uint8)
+    _, verdicts = decode_frames(row)
+    assert verdicts.tolist() == [Verdict.NO_FREQUENCY]
+    belief = WideAreaAverage(1, [7])
+    belief.deliver(row, np.zeros(1, int), np.zeros(1, int))
+    assert belief.wbar_pu.tolist() == [1.0]
+
+
+def test_brackets_on_the_wire_between_hosts_end_the_connection() -> None:
+    """Whoever connects to a waiting broker may send what it likes."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    with listener, socket.create_connection(listener.getsockname()) as theirs:
+        wire = Wire(listener.accept()[0])
+        theirs.sendall(b"[" * 100_000 + b"\n")
+        with pytest.raises(CosimError, match="something came that is not tieline's"):
+            wire.wait(10.0)
+        wire.close()
 
 
 @pytest.mark.parametrize(
