@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tieline.errors import CosimError
+from tieline.errors import CosimError, NumericalError
 from tieline.tables import (
     Column,
     TableStream,
@@ -145,6 +145,23 @@ def test_nan_is_stored_as_null(tmp_path: Path) -> None:
     write_table(tmp_path / "x.parquet", COLUMNS[:1], {"t_s": [1.0, np.nan]})
     assert pq.read_table(tmp_path / "x.parquet")["t_s"].null_count == 1
     assert np.isnan(read_table(tmp_path / "x.parquet")["t_s"][1])
+
+
+def test_infinity_is_stored_nowhere(tmp_path: Path) -> None:
+    """A table with an infinity in it would spoil every mean that is taken of it."""
+    columns = [Column("t_s", "s", "simulated time"), Column("delay_s", "s", "a delay")]
+    data = {"t_s": np.array([0.5, 1.0]), "delay_s": np.array([0.1, np.inf])}
+    with pytest.raises(NumericalError, match=r"a.parquet: delay_s is not finite .* at t = 1.0 s"):
+        write_table(tmp_path / "a.parquet", columns, data)
+    stream = TableStream(tmp_path / "b.parquet", columns)
+    stream.append({name: values[:1] for name, values in data.items()})
+    stream.flush()
+    stream.append(data)
+    with pytest.raises(NumericalError, match=r"b.parquet: delay_s is not finite .* at t = 1.0 s"):
+        stream.flush()
+    stream.close()
+    assert read_table(tmp_path / "b.parquet")["t_s"].tolist() == [0.5]
+    assert not (tmp_path / "a.parquet").exists()
 
 
 @pytest.mark.parametrize(

@@ -28,8 +28,26 @@ def case_folder(name: str) -> Path:
         InputError: there is no such case; the message lists the shipped ones.
     """
     for folder in (shipped("cases") / name, Path(name)):
-        if (folder / "case.yaml").is_file():
+        if is_file(folder / "case.yaml"):
             return folder.resolve()
     known = sorted(path.parent.name for path in shipped("cases").glob("*/case.yaml"))
     shown = ", ".join(known)
     raise InputError(f"no case '{name}': give one of {shown}, or a folder with a case.yaml")
+
+
+def is_file(path: Path) -> bool:
+    """Return whether a path leads to a file, whatever text it was made of."""
+    try:
+        return path.is_file()
+    except OSError:
+        # A name that is too long, or leads through a folder that is closed.
+        return False
+
+
+def is_endless(path: Path) -> bool:
+    """Return whether a path leads to what can be read without end: a device, a pipe or a socket."""
+    try:
+        return path.exists() and not (path.is_file() or path.is_dir())
+    except OSError:
+        # Whoever reads it says what is wrong with it.
+        return False

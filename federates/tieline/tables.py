@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import ArrayLike, NDArray
 
-from tieline.errors import CosimError
+from tieline.errors import CosimError, NumericalError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -125,16 +125,23 @@ class TableStream:
             raise _unwritten(self.path, error) from error
 
     def _write_batch(self) -> None:
+        """Write what is gathered.
+
+        Raises:
+            NumericalError: a value is infinite.
+        """
         arrays = {name: buffer[: self._filled] for name, buffer in self._buffers.items()}
+        # Whatever comes of it, these rows are done with: a table is also closed after a failure.
+        self._filled = 0
+        batch = _batch(self.path, self._schema, arrays)
         whole_bytes = self._sink.tell()
         try:
-            self._writer.write_batch(_batch(self._schema, arrays))
+            self._writer.write_batch(batch)
         except OSError as error:
             self._is_open = False
             # What follows half a batch could not be read.
             os.truncate(self._stream_path, whole_bytes)
             raise _unwritten(self.path, error) from error
-        self._filled = 0
 
 
 def salvage(folder: Path) -> list[Path]:
@@ -194,6 +201,7 @@ def write_table(path: Path, columns: Sequence[Column], data: Mapping[str, ArrayL
     Raises:
         ValueError: a column is missing or unknown, or the lengths differ.
         TypeError: values cannot be stored in their column without losing their kind.
+        NumericalError: a value is infinite.
         CosimError: the disk is full, or fails.
     """
     schema = _schema_of(columns, None)
@@ -207,8 +215,9 @@ def write_table(path: Path, columns: Sequence[Column], data: Mapping[str, ArrayL
     extra = {name: np.asarray(values) for name, values in data.items() if name not in arrays}
     _common_length(path, dict.fromkeys(schema.names), {**arrays, **extra})
     part = _part_of(path)
+    batch = _batch(path, schema, arrays)
     try:
-        pq.write_table(pa.Table.from_batches([_batch(schema, arrays)]), part, compression="zstd")
+        pq.write_table(pa.Table.from_batches([batch]), part, compression="zstd")
         part.replace(path)
     except OSError as error:
         part.unlink(missing_ok=True)
@@ -268,7 +277,14 @@ def _arrow_type(dtype: str) -> pa.DataType:
     return pa.string() if dtype == "str" else pa.from_numpy_dtype(np.dtype(dtype))
 
 
-def _batch(schema: pa.Schema, arrays: Mapping[str, NDArray[np.generic]]) -> pa.RecordBatch:
+def _batch(
+    path: Path, schema: pa.Schema, arrays: Mapping[str, NDArray[np.generic]]
+) -> pa.RecordBatch:
+    for name, values in arrays.items():
+        if values.dtype.kind == "f" and np.isinf(values).any():
+            row = int(np.argmax(np.isinf(values)))
+            when = f" at t = {arrays['t_s'][row]} s" if "t_s" in arrays else f" in row {row}"
+            raise NumericalError(f"{path.name}: {name} is not finite ({values[row]}){when}")
     columns = [_array(field.type, arrays[field.name]) for field in schema]
     return pa.RecordBatch.from_arrays(columns, schema=schema)
 

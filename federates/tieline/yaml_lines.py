@@ -7,6 +7,7 @@ from typing import Any
 import yaml
 
 from tieline.errors import InputError
+from tieline.resources import is_endless
 
 Key = str | int | float | bool | None
 Position = tuple[Key, ...]
@@ -62,6 +63,8 @@ def load(path: Path) -> Document:
             key twice, a merge key, an unknown tag, an alias within itself, groups more than
             `MAX_DEPTH` deep, or nested aliases that write out to more than `MAX_VALUES` values.
     """
+    if is_endless(path):
+        raise InputError(f"{path}: cannot be read (it is a device or a pipe)")
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:

@@ -50,6 +50,7 @@ def frequency(grid: Any) -> None:
 def state(grid: Any) -> None:
     """A state is no number."""
     grid._grid._x[grid._grid.system.labels.index("omega.G7")] = np.nan
+    grid._grid._is_current = False
 
 
 WAYS: dict[str, tuple[str, Callable[[Any], None]]] = {

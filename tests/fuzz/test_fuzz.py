@@ -3,26 +3,35 @@
 What the longer searches have found stands here, too, in plain words.
 """
 
+import socket
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fuzz import cases, experiments, frames, payloads, results, topologies
 from tieline import yaml_lines
+from tieline.c37118.batch import Verdict, decode_frames, encode_frames
 from tieline.c37118.config import ConfigFrame, PhasorChannel, PmuConfig
 from tieline.c37118.constants import FormatBit
 from tieline.c37118.data import DataFrame, PmuData
 from tieline.c37118.prefix import Prefix
-from tieline.errors import InputError
+from tieline.errors import CosimError, InputError
+from tieline.experiment.desk import Wire
 from tieline.experiment.load import load_experiment
+from tieline.experiment.plan import prepare
 from tieline.experiment.results import read_runs
 from tieline.grid.case import load_case
+from tieline.network.jitter.empirical import read_sample
+from tieline.network.path_delays import read_trace as read_delays
 from tieline.network.settings import NetworkSettings
 from tieline.network.topology import read_topology
+from tieline.network.traffic.trace import read_trace
+from tieline.wams import WideAreaAverage
 
 INPUTS = st.binary(min_size=2, max_size=120)
 
@@ -69,9 +78,7 @@ def test_a_file_may_be_as_deep_as_anybody_writes_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("number", ["0x" + "f" * 5_000, "1:" * 2_000 + "1", "-0b" + "1" * 20_000])
-def test_a_whole_number_that_cannot_even_be_printed_is_refused(
-    tmp_path: Path, number: str
-) -> None:
+def test_a_whole_number_that_cannot_even_be_printed_is_refused(tmp_path: Path, number: str) -> None:
     """Python does not print integers of some thousand digits, so the message itself failed."""
     path = tmp_path / "huge.yaml"
     path.write_text(f"name: x\nseed: {number}\n")
@@ -106,17 +113,45 @@ def test_a_number_among_the_keys_of_a_group_is_refused(tmp_path: Path) -> None:
         load_experiment(str(tmp_path / "x.yaml"))
 
 
-@pytest.mark.parametrize("written", ["a\\0b", "../../..", "/dev/zero", "x" * 5_000])
-def test_strange_paths_are_refused_wherever_one_may_stand(tmp_path: Path, written: str) -> None:
-    """A NUL, a device or a name without end must not reach the operating system as it is."""
-    for entry in (
-        f'extends: "{written}"',
-        f'extends: g26_trip_smoke\nnetwork: {{engine: empirical, empirical: {{trace: "{written}"}}}}',
-        f'extends: g26_trip_smoke\ngrid: {{pss: {{file: "{written}"}}}}',
-    ):
-        (tmp_path / "x.yaml").write_text(f"name: x\n{entry}\n")
-        with pytest.raises(InputError):
-            load_experiment(str(tmp_path / "x.yaml"))
+ENTRIES = (
+    'extends: "{}"',
+    'extends: g26_trip_smoke\ncase: "{}"',
+    'extends: g26_trip_smoke\nnetwork: {{topology: "{}"}}',
+    'extends: g26_trip_smoke\nnetwork: {{engine: empirical, empirical: {{trace: "{}"}}}}',
+    'extends: g26_trip_smoke\ngrid: {{pss: {{file: "{}"}}}}',
+    "extends: g26_trip_smoke\n"
+    'network: {{traffic: [{{kind: trace, from: S101, to: S105, file: "{}"}}]}}',
+)
+
+
+@pytest.mark.parametrize("name", ["a\\0b", "../../..", "/dev/zero", "x" * 5_000], ids=range(4))
+@pytest.mark.parametrize("entry", ENTRIES, ids=range(len(ENTRIES)))
+def test_strange_paths_are_refused_wherever_one_may_stand(
+    tmp_path: Path, entry: str, name: str
+) -> None:
+    """A long name ended in a traceback, and `/dev/zero` as a trace was read until memory ended."""
+    (tmp_path / "x.yaml").write_text("name: x\n" + entry.format(name) + "\n")
+    with pytest.raises(InputError):
+        prepare(load_experiment(str(tmp_path / "x.yaml")))
+
+
+def test_a_device_in_the_place_of_a_file_is_refused(tmp_path: Path) -> None:
+    """A symbolic link to a device has no end."""
+    for name in ("case.yaml", "bus.csv"):
+        (tmp_path / name).symlink_to("/dev/zero")
+    with pytest.raises(InputError, match=r"bus.csv: cannot be read \(it is a device or a pipe\)"):
+        load_case(tmp_path)
+
+
+@pytest.mark.parametrize("read", [read_trace, read_sample, lambda p: read_delays(p, [], [])])
+def test_a_table_with_an_endless_cell_is_refused(tmp_path: Path, read: Callable) -> None:
+    """Python's reader of tables gives up at 131,072 characters, with an error of its own."""
+    path = tmp_path / "x.csv"
+    path.write_text("time_s,payload_bytes,delay_s\n" + "1" * 200_000 + ",1,1\n")
+    if read not in (read_trace, read_sample):
+        path.write_text("delay_s\n" + "1" * 200_000 + "\n")
+    with pytest.raises((InputError, ValueError), match="field larger than field limit"):
+        read(path)
 
 
 @pytest.mark.parametrize("content", [b"name: \xff\xfe\n", b"name: a\0b\n", b"\xed\xa0\x80: 1\n"])
@@ -150,11 +185,34 @@ def test_a_polar_phasor_with_an_infinite_angle_is_no_measurement(angle: float) -
     pmu = PmuConfig("Station A", 7, form, (PhasorChannel("VA"),))
     config = ConfigFrame(Prefix(7, 0, 0), (pmu,), 60)
     sound = DataFrame(Prefix(7, 0, 0), (PmuData(0, (1 + 0j,), 60.0, 0.0),)).to_bytes(config)
-    words = frames.np.array([1.0, angle], ">f4").tobytes()
+    words = np.array([1.0, angle], ">f4").tobytes()
     spoilt = sound[:16] + words + sound[24:-2]
     spoilt += frames.crc_of(spoilt).to_bytes(2, "big")
     [phasor] = DataFrame.from_bytes(spoilt, config).pmus[0].phasors
     assert phasor != phasor
+
+
+def test_a_signalling_nan_is_no_frequency() -> None:
+    """Any bits may stand where a frequency is; NumPy warns of these when it widens them."""
+    row = encode_frames([7], 0, np.ones(1), 60.0, 0.0)
+    row[0, 24:28] = (0x7F, 0x80, 0, 1)
+    row[0, -2:] = np.frombuffer(frames.crc_of(row[0, :-2].tobytes()).to_bytes(2, "big"), np.uint8)
+    _, verdicts = decode_frames(row)
+    assert verdicts.tolist() == [Verdict.NO_FREQUENCY]
+    belief = WideAreaAverage(1, [7])
+    belief.deliver(row, np.zeros(1, int), np.zeros(1, int))
+    assert belief.wbar_pu.tolist() == [1.0]
+
+
+def test_brackets_on_the_wire_between_hosts_end_the_connection() -> None:
+    """Whoever connects to a waiting broker may send what it likes."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    with listener, socket.create_connection(listener.getsockname()) as theirs:
+        wire = Wire(listener.accept()[0])
+        theirs.sendall(b"[" * 100_000 + b"\n")
+        with pytest.raises(CosimError, match="something came that is not tieline's"):
+            wire.wait(10.0)
+        wire.close()
 
 
 @pytest.mark.parametrize(

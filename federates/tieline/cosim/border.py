@@ -59,12 +59,16 @@ class DeliveryBorder:
             )
         self._is_delivered[k % FRAMES_REMEMBERED] = False
         records = bundle.records
-        columns = [
-            records[name].astype(np.int64)
-            for name in ("arrival_ns", "source", "destination", "sequence")
-        ]
         place, fault = _fault(
-            *columns, k, since_ns, until_ns, self._clock.rate_hz, self._is_delivered
+            records["arrival_ns"].astype(np.int64),
+            records["source"].astype(np.int64),
+            records["destination"].astype(np.int64),
+            records["sequence"].astype(np.int64),
+            k,
+            since_ns,
+            until_ns,
+            self._clock.rate_hz,
+            self._is_delivered,
         )
         if place != _SOUND:
             self._refuse(k, records, int(place), int(fault))

@@ -53,7 +53,7 @@ class Strangers:
             self._say(f"warning: {endpoint} drops more of the kind, which are only counted")
 
     def save(self, folder: Path) -> None:
-        """Leave the counts beside the federate's tables and in its log; nothing if there are none."""
+        """Leave the counts, if there are any, beside the federate's tables and in its log."""
         if not self.counts:
             return
         for endpoint, sources in self.counts.items():

@@ -11,7 +11,7 @@ from typing import Any
 from tieline import yaml_lines
 from tieline.errors import InputError
 from tieline.problems import Path, near, value_at
-from tieline.resources import shipped
+from tieline.resources import is_file, shipped
 from tieline.yaml_lines import Document
 
 EXTENDS = "extends"
@@ -103,7 +103,7 @@ def find_experiment(reference: str) -> pathlib.Path:
         InputError: there is no such file; the message lists the shipped experiments.
     """
     path = pathlib.Path(reference)
-    if _is_file(path):
+    if is_file(path):
         return path
     by_name = _shipped_file(reference)
     if by_name is not None:
@@ -138,7 +138,7 @@ def _base_of(document: Document) -> pathlib.Path | None:
         )
     beside = document.path.parent / name
     for path in (beside, pathlib.Path(f"{beside}.yaml"), _shipped_file(name)):
-        if path is not None and _is_file(path):
+        if path is not None and is_file(path):
             return path
     raise InputError(f"{_where(document)}: extends no experiment {_unfound(name)}")
 
@@ -149,15 +149,7 @@ def _where(document: Document) -> str:
 
 def _shipped_file(name: str) -> pathlib.Path | None:
     path = shipped("configs") / f"{name}.yaml"
-    return path if re.fullmatch(r"[\w-]+", name) and _is_file(path) else None
-
-
-def _is_file(path: pathlib.Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:
-        # A name that is too long, or leads through a folder that is closed.
-        return False
+    return path if re.fullmatch(r"[\w-]+", name) and is_file(path) else None
 
 
 def _unfound(reference: str) -> str:
@@ -220,7 +212,7 @@ def _absolute(name: Any, folder: pathlib.Path) -> Any:
     if isinstance(name, dict) and isinstance(name.get("choice"), list):
         return name | {"choice": _absolute(name["choice"], folder)}
     is_there = isinstance(name, str) and any(
-        path.is_file() for path in (folder / name, folder / name / "case.yaml")
+        is_file(path) for path in (folder / name, folder / name / "case.yaml")
     )
     return str(folder / name) if is_there else name
 

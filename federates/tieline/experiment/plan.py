@@ -17,7 +17,7 @@ from tieline.experiment.sites import Sites, Survey, Surveyor
 from tieline.experiment.sweep import Gathered, Point
 from tieline.network.settings import PACKET_ENGINES
 from tieline.problems import near
-from tieline.resources import case_folder, shipped
+from tieline.resources import case_folder, is_file, shipped
 
 _GIVEN = re.compile(r" \(got [^()]*\)")
 """What points may be wrong in, each in its own way, with one sentence for all."""
@@ -149,7 +149,7 @@ def _with_pss_file(experiment: Experiment, beside: Path) -> Experiment:
     if name is None:
         return experiment
     for path in (beside / name, Path(name)):
-        if path.is_file():
+        if is_file(path):
             pss = experiment.grid.pss.model_copy(update={"file": str(path.resolve())})
             grid = experiment.grid.model_copy(update={"pss": pss})
             return experiment.model_copy(update={"grid": grid})
@@ -166,7 +166,7 @@ def _with_trace(experiment: Experiment, beside: Path) -> Experiment:
     if empirical is None or empirical.trace is None:
         return experiment
     for path in (beside / empirical.trace, Path(empirical.trace)):
-        if path.is_file():
+        if is_file(path):
             found = empirical.model_copy(update={"trace": str(path.resolve())})
             network = experiment.network.model_copy(update={"empirical": found})
             return experiment.model_copy(update={"network": network})
@@ -179,7 +179,7 @@ def _with_trace(experiment: Experiment, beside: Path) -> Experiment:
 def _case_folder(name: str, beside: Path) -> Path:
     """Return the case's folder; a path counts from the experiment's file, or else from here."""
     local = beside / name
-    if (local / "case.yaml").is_file():
+    if is_file(local / "case.yaml"):
         return local.resolve()
     try:
         return case_folder(name)
@@ -198,7 +198,7 @@ def _topology(experiment: Experiment, folder: Path, beside: Path) -> Path | None
     name = experiment.network.topology
     places = [beside / name, Path(name), folder / f"{name}.yaml", folder / name]
     for path in [folder / "network.yaml"] if name == "case" else places:
-        if path.is_file():
+        if is_file(path):
             return path.resolve()
     if name == "case":
         raise InputError(

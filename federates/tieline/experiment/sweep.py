@@ -106,7 +106,8 @@ def _listed(sweep: Sequence[Any], data: Any, sources: Sources) -> tuple[list[Poi
         if not isinstance(entry, dict):
             where = sources.where([("sweep", i)])
             findings.append(
-                f"{where}: sweep[{i}] must be a group of keys: label, and settings (got {entry!r:.60})"
+                f"{where}: sweep[{i}] must be a group of keys: label, and settings"
+                f" (got {entry!r:.60})"
             )
             continue
         misspelt = next((key for key in entry if "label" not in entry and _is_label(key)), "label")

@@ -244,9 +244,8 @@ class GridFederate:
         }
         at_s = self._grid.tick / self._grid.steps_per_second
         for name, values in quantities.items():
-            check_finite(
-                values, lambda i, name=name: f"{name}.B{self._sensors[i]}", at_s, LARGEST_IN_A_FRAME
-            )
+            buses = [f"{name}.B{bus}" for bus in self._sensors]
+            check_finite(values, buses.__getitem__, at_s, LARGEST_IN_A_FRAME)
 
     def _note_age(self) -> None:
         """Say how old the controllers' data are at the row that the grid writes next."""

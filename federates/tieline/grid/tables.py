@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tieline.errors import InputError
+from tieline.resources import is_endless
 
 LARGEST_WHOLE = 999_999_999
 
@@ -161,6 +162,9 @@ def read_table(
 
 def _lines(path: Path, findings: Findings) -> Iterator[tuple[str, list[str]]]:
     """Yield place and stripped cells of each line that says anything, up to one beyond reading."""
+    if is_endless(path):
+        findings.add(path.name, "cannot be read (it is a device or a pipe)")
+        return
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except OSError as error:

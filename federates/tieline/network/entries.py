@@ -282,7 +282,7 @@ class Entries:
             ends = (raw.get("a"), raw.get("b")) if isinstance(raw, dict) else (None, None)
             if not all(isinstance(end, str) and end in self._names for end in ends):
                 return
-            graph.add_edge(*ends)
+            graph.add_edge(str(ends[0]), str(ends[1]))
         parts = sorted(nx.connected_components(graph), key=lambda part: (-len(part), min(part)))
         for part in parts[1:]:
             self._findings.add(("nodes", min(part)), self._cut_off(part))

@@ -7,6 +7,8 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, TypeAdapter, ValidationInfo
 from pydantic_core.core_schema import CoreSchema
 
+from tieline.resources import is_endless
+
 
 class Entry(BaseModel):
     """Refuses keys that it does not know."""
@@ -38,9 +40,12 @@ def named_file(value: Any, info: ValidationInfo) -> Path:
     """Return the path of a file that an entry names, relative to the topology file.
 
     Raises:
-        ValueError: the name is no text.
+        ValueError: the name is no text, or leads to a device or a pipe.
     """
     if not isinstance(value, str):
         raise ValueError(f"must be the path of a file (got {value!r})")
     folder: Path = (info.context or {}).get("folder", Path())
-    return folder / value
+    path = folder / value
+    if is_endless(path):
+        raise ValueError(f"cannot read {path}: it is a device or a pipe")
+    return path

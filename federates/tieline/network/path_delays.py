@@ -133,13 +133,19 @@ def read_trace(path: Path, sources: Sites, destinations: Sites) -> list[NDArray[
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path} cannot be read: {error}") from error
     rows = csv.reader(text.splitlines())
+    try:
+        return _delays_of(path, rows, _Names(sources, destinations))
+    except csv.Error as error:
+        raise InputError(f"{path}:{rows.line_num}: is malformed ({error})") from error
+
+
+def _delays_of(path: Path, rows: Any, names: "_Names") -> list[NDArray[np.int64]]:
     header = [name.strip() for name in next(rows, [])]
     if header not in (_ALL, _BY_PATH):
         raise InputError(
             f"{path}:1: the columns must be '{_ALL[0]}' or '{','.join(_BY_PATH)}'"
             f" (got '{','.join(header)}')"
         )
-    names = _Names(sources, destinations)
     lists: list[list[float]] = [[] for _ in range(names.paths if header == _BY_PATH else 1)]
     findings: list[str] = []
     for row in rows:

@@ -55,7 +55,7 @@ def read_sample(path: Path) -> list[int]:
             if COLUMN not in (rows.fieldnames or ()):
                 raise ValueError(f"{path}:1: no column '{COLUMN}' (has {rows.fieldnames})")
             sample = [_delay_ns(path, rows.line_num, row[COLUMN]) for row in rows]
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ValueError(f"cannot read {path}: {error}") from error
     if not sample:
         raise ValueError(f"{path} holds no delay")

@@ -83,7 +83,7 @@ def read_trace(path: Path) -> Trace:
                         f"{where}: 'time_s' must not be before the line above "
                         f"({row['time_s']} s after {times[-2] / NS_PER_S:g} s)"
                     )
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ValueError(f"cannot read {path}: {error}") from error
     return Trace(np.array(times, dtype=np.int64), np.array(payloads, dtype=np.int64))
 
