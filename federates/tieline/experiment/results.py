@@ -5,14 +5,16 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import pyarrow.parquet as pq
 
 from tieline.errors import InputError
 from tieline.tables import column_names, read_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MANIFEST = "manifest.json"
 SUMMARY = "summary.json"
@@ -57,10 +59,14 @@ class Run:
         """Return the summary."""
         return read_json(self.folder / SUMMARY)
 
-    def table(self, name: str, *columns: str) -> pd.DataFrame:
+    def table(self, name: str, *columns: str) -> "pd.DataFrame":
         """Return a table (`grid`, `flows`, ...), or some columns; no rows if it was not written."""
         path = self.folder / f"{name}.parquet"
-        return read_table(path, columns or None) if path.is_file() else pd.DataFrame()
+        if path.is_file():
+            return read_table(path, columns or None)
+        import pandas as pd
+
+        return pd.DataFrame()
 
     def columns(self, name: str) -> list[str]:
         """Return the names of a table's columns; none if it was not written."""
