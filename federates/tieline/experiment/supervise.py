@@ -14,6 +14,7 @@ from typing import IO, Any, Protocol
 
 import tieline
 from tieline.cosim.process import LAUNCHER_VARIABLE
+from tieline.threads import one_thread
 
 _LOG_LIMIT_BYTES = 1_000_000
 _TAIL_LINES = 8
@@ -264,10 +265,7 @@ def shared_environment(before: Mapping[str, str]) -> dict[str, str]:
         "PATH": f"{programs}{os.pathsep}{before.get('PATH', os.defpath)}",
         "PYTHONFAULTHANDLER": before.get("PYTHONFAULTHANDLER", "1"),
     }
-    # The matrices are small: threads of a linear algebra library cost here more than they give.
-    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        shared[variable] = before.get(variable, "1")
-    return shared
+    return shared | one_thread(before)
 
 
 def child_environment() -> dict[str, str]:
