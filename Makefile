@@ -82,6 +82,8 @@ $(VENV)/created:
 $(VENV)/runtime: pyproject.toml | $(VENV)/created
 	@echo "Installing tieline and what it needs into $(VENV) (a minute or two, once)"
 	$(PIP) --editable .
+	@echo "Compiling what a run needs (a minute or two, once)"
+	@-$(BIN)/tieline run g26_trip_smoke --quiet --out $(VENV)/first_run > /dev/null
 	@touch $@
 
 $(VENV)/development: pyproject.toml | $(VENV)/created

@@ -4,6 +4,7 @@ import os
 import sys
 import threading
 import traceback
+import warnings
 from collections.abc import Callable
 
 
@@ -32,7 +33,10 @@ class Aside:
 def _forked(work: Callable[[], object]) -> int:
     sys.stdout.flush()
     sys.stderr.flush()
-    pid = os.fork()
+    with warnings.catch_warnings():
+        # Arrow and the linear algebra keep threads that see to themselves at a fork.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        pid = os.fork()
     if pid:
         return pid
     code = 1

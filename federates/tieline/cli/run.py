@@ -1,6 +1,7 @@
 """`tieline run`, `list` and `validate`: experiments, run and checked."""
 
 import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,6 +19,7 @@ from tieline.cli.options import (
 )
 from tieline.console import console_of, reporting, say
 from tieline.errors import InputError
+from tieline.threads import one_thread
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -57,6 +59,8 @@ def run(
 
     A sweep runs its points at once, as `tieline sweep` does.
     """
+    # Before any import of NumPy, and for the federates that are forked from this process.
+    os.environ.update(one_thread(os.environ))
     from tieline.experiment.load import load_experiment
 
     with reporting(debug):

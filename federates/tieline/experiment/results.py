@@ -70,10 +70,12 @@ class Run:
 
     def table(self, name: str, *columns: str) -> "pd.DataFrame":
         """Return a table (`grid`, `flows`, ...), or some columns; no rows if it was not written."""
+        path = stored(self.folder / f"{name}.parquet")
+        if path is not None:
+            return read_table(path, columns or None)
         import pandas as pd
 
-        path = stored(self.folder / f"{name}.parquet")
-        return pd.DataFrame() if path is None else read_table(path, columns or None)
+        return pd.DataFrame()
 
     def columns(self, name: str) -> list[str]:
         """Return the names of a table's columns; none if it was not written."""

@@ -1,14 +1,16 @@
 """Condenses a run to the numbers of its closing table; reads result folders only."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from tieline.experiment.results import Run
 from tieline.experiment.ringdown import ring_down
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SETTLING_S = 5.0
 """The settling value is the mean over this long at the end of a run that lasts four times as long
@@ -49,7 +51,7 @@ def summarise(run: Run) -> dict[str, Any]:
     }
 
 
-def _frequency(run: Run, grid: pd.DataFrame, nominal_hz: float) -> dict[str, Any]:
+def _frequency(run: Run, grid: "pd.DataFrame", nominal_hz: float) -> dict[str, Any]:
     """Nadir after the first event and settling value of the centre-of-inertia frequency."""
     time_s, frequency_hz = _values(grid, "t_s"), nominal_hz * _values(grid, "coi_pu")
     # The ending of a run without a future is logged last; nothing is recorded from it on.
@@ -69,7 +71,7 @@ def _frequency(run: Run, grid: pd.DataFrame, nominal_hz: float) -> dict[str, Any
     }
 
 
-def _swing(run: Run, grid: pd.DataFrame, tie_mode: Mapping[str, Any] | None) -> dict[str, Any]:
+def _swing(run: Run, grid: "pd.DataFrame", tie_mode: Mapping[str, Any] | None) -> dict[str, Any]:
     """Ring-down of the tie mode: one group of units against another, after the last event."""
     if tie_mode is None:
         return _no_swing("the case names no tie mode")
@@ -106,7 +108,7 @@ def _no_swing(reason: str | None) -> dict[str, Any]:
     return {"frequency_hz": None, "damping_ratio": None, "reason": reason}
 
 
-def _mean_speed(grid: pd.DataFrame, units: list[str]) -> NDArray[np.float64]:
+def _mean_speed(grid: "pd.DataFrame", units: list[str]) -> NDArray[np.float64]:
     return np.mean([_values(grid, f"speed_pu.{unit}") for unit in units], axis=0)
 
 
@@ -131,7 +133,7 @@ def _delay(run: Run) -> dict[str, Any]:
     }
 
 
-def _quantile(counts: pd.DataFrame, share: float) -> float | None:
+def _quantile(counts: "pd.DataFrame", share: float) -> float | None:
     """Return a quantile from the histogram, linear within a bin."""
     if not len(counts) or not counts["count"].sum():
         return None
@@ -143,7 +145,7 @@ def _quantile(counts: pd.DataFrame, share: float) -> float | None:
     return float(low + within * (high - low))
 
 
-def _packets(flows: pd.DataFrame) -> dict[str, Any]:
+def _packets(flows: "pd.DataFrame") -> dict[str, Any]:
     names = ("sent", "delivered", "dropped_queue", "dropped_loss", "dropped_down", "in_flight")
     totals = {name: int(flows[name].sum()) if name in flows else 0 for name in names}
     lost = totals["dropped_queue"] + totals["dropped_loss"] + totals["dropped_down"]
@@ -152,7 +154,7 @@ def _packets(flows: pd.DataFrame) -> dict[str, Any]:
     return totals | {"loss": lost / ended if ended else 0.0}
 
 
-def _age(grid: pd.DataFrame) -> dict[str, Any]:
+def _age(grid: "pd.DataFrame") -> dict[str, Any]:
     """Mean age of the data that each controller holds, over the time that it holds any."""
     prefix = "age_s."
     means = {
@@ -164,7 +166,7 @@ def _age(grid: pd.DataFrame) -> dict[str, Any]:
     return {"mean_s": mean, "controllers_s": means}
 
 
-def _lowest_voltage(run: Run, grid: pd.DataFrame) -> dict[str, Any] | None:
+def _lowest_voltage(run: Run, grid: "pd.DataFrame") -> dict[str, Any] | None:
     """The unit in service with the lowest terminal voltage of the run."""
     prefix = "vt_pu."
     lost = {prefix + unit for unit in run.tripped_units()}
@@ -181,5 +183,5 @@ def _lowest_voltage(run: Run, grid: pd.DataFrame) -> dict[str, Any] | None:
     }
 
 
-def _values(table: pd.DataFrame, column: str) -> NDArray[np.float64]:
+def _values(table: "pd.DataFrame", column: str) -> NDArray[np.float64]:
     return table[column].to_numpy(dtype=np.float64)

@@ -16,6 +16,7 @@ from tieline.cosim.process import LAUNCHER_VARIABLE
 from tieline.experiment.strays import RUN_VARIABLE
 from tieline.experiment.watch import Effort
 from tieline.logs import LINE_BEGINS, Log, Record
+from tieline.threads import one_thread
 
 _READ_BYTES = 65_536
 _UTIME = 11
@@ -261,10 +262,7 @@ def shared_environment(before: Mapping[str, str]) -> dict[str, str]:
         "PATH": f"{programs}{os.pathsep}{before.get('PATH', os.defpath)}",
         "PYTHONFAULTHANDLER": before.get("PYTHONFAULTHANDLER", "1"),
     }
-    # The matrices are small: threads of a linear algebra library cost here more than they give.
-    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        shared[variable] = before.get(variable, "1")
-    return shared
+    return shared | one_thread(before)
 
 
 def child_environment(run: Path | None = None) -> dict[str, str]:

@@ -23,7 +23,6 @@ from tieline.experiment.point import (
     task_of,
     work_folder,
 )
-from tieline.experiment.points_table import write_points
 from tieline.experiment.results import POINTS, SUMMARY, is_result, read_manifest, read_runs
 from tieline.experiment.sweep import Point
 
@@ -233,6 +232,9 @@ def _close_folder(plan: Plan, target: Path, reason: str | None) -> None:
     summaries = [run.summary() for run in complete]
     write_json(target / SUMMARY, {"name": plan.study.name, "points": summaries})
     save_manifest(target, sweep_manifest(plan, reason))
+    # It brings pandas with it, for which a single run's federates should not wait.
+    from tieline.experiment.points_table import write_points
+
     write_points(target)
 
 

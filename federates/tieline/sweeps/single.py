@@ -1,14 +1,13 @@
 """Launches one run from the process that planned it, whose federates inherit its imports."""
 
 import importlib
-import os
-import sys
 import threading
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
 from tieline.experiment.launch import Outcome, launch
-from tieline.experiment.supervise import executed, shared_environment
+from tieline.experiment.supervise import executed
 from tieline.experiment.watch import Progress
 from tieline.sweeps.fork import forked
 
@@ -19,13 +18,6 @@ WITH_HELICS = ("tieline.cosim.federate", "tieline.cosim.inproc")
 
 _AFTERWARDS = ("tieline.experiment.report", "matplotlib.backends.backend_agg")
 """What only the end of a run needs, imported while it runs."""
-
-
-def settle_environment() -> None:
-    """Give this process the variables that those forked from it must find before any import."""
-    for name, value in shared_environment(os.environ).items():
-        if name.endswith("_NUM_THREADS"):
-            os.environ.setdefault(name, value)
 
 
 def launch_here(folder: Path, on_progress: Callable[[Progress], None]) -> Outcome:
@@ -41,13 +33,29 @@ def launch_here(folder: Path, on_progress: Callable[[Progress], None]) -> Outcom
             ahead.start()
         on_progress(progress)
 
-    if not sys.platform.startswith("linux") or threading.active_count() > 1:
-        return launch(folder, heard, start=executed)
     for module in (*FEDERATES, *WITH_HELICS):
         importlib.import_module(module)
-    outcome = launch(folder, heard, start=forked)
+    if not _can_fork():
+        return launch(folder, heard, start=executed)
+    with warnings.catch_warnings():
+        # Python counts Arrow's thread.
+        warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
+        outcome = launch(folder, heard, start=forked)
     ahead.join()
     return outcome
+
+
+def _can_fork() -> bool:
+    """Return whether no thread of this process could hold a lock that a fork then waits for.
+
+    Arrow's memory pool has a thread that sees to itself when its process is forked.
+    """
+    try:
+        tasks = list(Path("/proc/self/task").iterdir())
+        names = [(task / "comm").read_text(encoding="utf-8").strip() for task in tasks]
+    except OSError:
+        return False
+    return len([name for name in names if name != "jemalloc_bg_thd"]) == 1
 
 
 def _import_ahead() -> None:
