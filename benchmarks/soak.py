@@ -97,7 +97,8 @@ def sampled_run(folder: Path, settings: Sequence[str]) -> list[Sample]:
     """
     command = [sys.executable, str(ROOT / "runner.py"), "run", "g26_trip", "--quiet"]
     samples: list[Sample] = []
-    with subprocess.Popen([*command, "--out", str(folder), *settings]) as run:
+    command += ["--out", str(folder), *settings]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as run:
         while run.poll() is None:
             time.sleep(PERIOD_S)
             samples += [(time.time(), *seen) for pid in family(run.pid) if (seen := look(pid))]
