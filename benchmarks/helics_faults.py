@@ -280,7 +280,8 @@ def _measured(
     leftover = None
     if fault == "leftover broker on the port":
         words = [f"{PROGRAMS}/helics_broker", "-f", "2", f"--port={port}"]
-        leftover = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        quiet = subprocess.DEVNULL
+        leftover = subprocess.Popen(words, stdout=quiet, stderr=quiet, start_new_session=True)
         time.sleep(2)
     # Its output goes where the disk is not full.
     with TemporaryDirectory() as beside:
@@ -308,7 +309,7 @@ def _measured(
                 process.kill()
             launcher.wait()
             if leftover is not None:
-                leftover.kill()
+                os.killpg(leftover.pid, signal.SIGKILL)
                 leftover.wait()
 
 
