@@ -198,11 +198,16 @@ class Trial:
 
     def find(self, word: str) -> psutil.Process:
         """Return the process whose command line holds a word."""
-        return next(
-            process
-            for process in self.members()
-            if any(word in part for part in process.cmdline()) and process.pid != self.launcher.pid
-        )
+        for process in self.members():
+            words = process.cmdline()
+            if process.pid != self.launcher.pid and any(word in part for part in words):
+                return process
+        # `tieline run` forks its federates: only its log tells which process is which.
+        for path in self.folder.rglob("launcher*"):
+            for line in path.read_text(errors="replace").splitlines():
+                if line.startswith("{") and '"pid"' in line and word in line:
+                    return psutil.Process(int(json.loads(line)["pid"]))
+        raise RuntimeError(f"no process with {word} in {self.way.name}")
 
     def signal(self, word: str, number: int) -> None:
         """Send a signal to one of them."""
@@ -275,7 +280,8 @@ def _measured(
     leftover = None
     if fault == "leftover broker on the port":
         words = [f"{PROGRAMS}/helics_broker", "-f", "2", f"--port={port}"]
-        leftover = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        quiet = subprocess.DEVNULL
+        leftover = subprocess.Popen(words, stdout=quiet, stderr=quiet, start_new_session=True)
         time.sleep(2)
     # Its output goes where the disk is not full.
     with TemporaryDirectory() as beside:
@@ -303,7 +309,7 @@ def _measured(
                 process.kill()
             launcher.wait()
             if leftover is not None:
-                leftover.kill()
+                os.killpg(leftover.pid, signal.SIGKILL)
                 leftover.wait()
 
 

@@ -39,7 +39,7 @@ SETTINGS = (
     "seed=7",
 )
 PAUSING = Path(__file__).parent / "pausing.py"
-TOLERANCE = 1e-7
+TOLERANCE = 1e-10
 SHORT_S = 0.3
 
 

@@ -1,5 +1,6 @@
 """Runs a plan: one folder a run, named in the end, marked for what it is when it fails."""
 
+import glob
 import itertools
 import os
 import shutil
@@ -141,7 +142,7 @@ def _own_folder(target: Path) -> Iterator[Path]:
         raise InputError(f"--out {target} cannot be written ({error.strerror})") from error
     with ExitStack() as stack:
         with waited_for(target.parent):
-            for other in target.parent.glob(f".{target.name}.partial-*"):
+            for other in target.parent.glob(f".{glob.escape(target.name)}.partial-*"):
                 if not is_free(other):
                     raise InputError(
                         f"--out {target}: another run is under way there ({other.name}); give"
