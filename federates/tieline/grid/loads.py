@@ -24,8 +24,8 @@ SWEEPS_TO_CHOOSE = 20
 """Sweeps after which a load at low voltage stays an impedance for the rest of the solution."""
 
 MOST_REDUCED = 64
-"""Most loads for which a dense matrix between them costs less than the sparse network: on one core
-a sweep of it is 0.25 us for 23 loads and grows with their square."""
+"""Most loads for which a dense matrix between them costs less than the sparse network, whose cost
+does not grow with their square."""
 
 UNSEEN = -1
 """Marks a load that does not answer to frequency."""
