@@ -35,13 +35,13 @@ def launch_here(folder: Path, on_progress: Callable[[Progress], None]) -> Outcom
 
     for module in (*FEDERATES, *WITH_HELICS):
         importlib.import_module(module)
-    if not _can_fork():
-        return launch(folder, heard, start=executed)
+    start = forked if _can_fork() else executed
     with warnings.catch_warnings():
         # Python counts Arrow's thread.
         warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
-        outcome = launch(folder, heard, start=forked)
-    ahead.join()
+        outcome = launch(folder, heard, start=start)
+    if ahead.ident:
+        ahead.join()
     return outcome
 
 
