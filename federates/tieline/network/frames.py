@@ -107,7 +107,7 @@ def _hand_over(
         marks[sequence & mask, arrival["source"]] = -1
     count = 0
     for sequence in range(first, last + 1):
-        place = sequence & mask
+        place = np.int64(sequence & mask)
         if sequences[place] != sequence:
             continue
         for source in range(marks.shape[1]):
