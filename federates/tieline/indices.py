@@ -14,7 +14,7 @@ from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.untyped_passes import InlineInlinables
 
 
-class IndicesFromZero(CompilerBase):  # type: ignore[misc]
+class IndicesFromZero(CompilerBase):
     """numba's compiler, which takes every index of an element as not negative.
 
     A slice is no index of an element: functions with slices are not for this compiler.
@@ -28,8 +28,8 @@ class IndicesFromZero(CompilerBase):  # type: ignore[misc]
         return [passes]
 
 
-@register_pass(mutates_CFG=False, analysis_only=False)  # type: ignore[untyped-decorator]
-class _UnsignedIndices(FunctionPass):  # type: ignore[misc]
+@register_pass(mutates_CFG=False, analysis_only=False)
+class _UnsignedIndices(FunctionPass):
     """Makes unsigned numbers of the indices with which elements are read and written."""
 
     _name = "unsigned_indices"

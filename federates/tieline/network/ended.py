@@ -42,9 +42,11 @@ def ended(records: NDArray[np.void], flow_of: NDArray[np.int64], rate_hz: int) -
         return NONE_ENDED
     assert records.dtype.names is not None
     names = (records.dtype.names[0], "source", "destination", "sequence")
-    columns = [np.ascontiguousarray(records[name]) for name in names]
+    ended_ns, sources, destinations, sequences = (
+        np.ascontiguousarray(records[name]) for name in names
+    )
     table = np.empty((5, len(records)), dtype=np.int64)
-    _describe(*columns, flow_of, rate_hz, table)
+    _describe(ended_ns, sources, destinations, sequences, flow_of, rate_hz, table)
     return Ended(*table)
 
 
@@ -58,7 +60,7 @@ def _describe(
     rate_hz: int,
     table: NDArray[np.int64],
 ) -> None:
-    last, measured_ns = -1, 0
+    last, measured_ns = np.int64(-1), np.int64(0)
     for place in range(len(ended_ns)):
         sequence = np.int64(sequences[place])
         if sequence != last:

@@ -106,9 +106,9 @@ def _hand_over(
         first, last = min(first, sequence), max(last, sequence)
         marks[sequence & mask, arrival["source"]] = -1
     count = 0
-    for sequence in range(first, last + 1):
-        place = sequence & mask
-        if sequences[place] != sequence:
+    for number in range(first, last + 1):
+        place = np.int64(number & mask)
+        if sequences[place] != number:
             continue
         for source in range(marks.shape[1]):
             if marks[place, source] < 0:
