@@ -12,18 +12,14 @@ import re
 import resource
 import signal
 import subprocess
-import sys
 import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
-import pyarrow.parquet as pq
-
+from faults.looking import look_at_result, read
+from faults.trial import VISITOR, Finding, Trial
 from tieline.tables import read_whole
 
 END_WITHIN_S = 10.0
@@ -33,78 +29,19 @@ want to run on each core."""
 PATIENCE_S = 200.0
 START_S = 120.0
 BLOCK = 100
-GRANTED = "last granted"
-VISITOR = "visitor"
 
 _MARK = "TIELINE_TRIAL"
 _LOOK_S = 0.02
 _LISTENS = "0A"
 _COMMANDS = {
-    "broker": r"tieline\.cosim\.broker",
-    "grid": r"tieline\.grid\b|dummy\.py\0grid\0",
-    "network": r"tieline\.network\b|dummy\.py\0network\0",
-    "together": r"tieline\.cosim\.together|dummy\.py\0together\0",
+    "broker": r"tieline\.cosim\.broker|^tieline-broker",
+    "grid": r"tieline\.grid\b|dummy\.py\0grid\0|^tieline-grid",
+    "network": r"tieline\.network\b|dummy\.py\0network\0|^tieline-network",
+    "together": r"tieline\.cosim\.together|dummy\.py\0together\0|^tieline-together",
     "keeper": r"strays\.py",
     VISITOR: r"guest\.py",
 }
 _SIGNALS = {"KILL": signal.SIGKILL, "STOP": signal.SIGSTOP, "TERM": signal.SIGTERM}
-
-GUEST = """
-import helics, json, subprocess, sys
-# A child that left its parent's group and hears no SIGTERM: what a guest's own tools may be like.
-deaf = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); time.sleep(3600)"
-subprocess.Popen([sys.executable, "-S", "-c", deaf], start_new_session=True)
-config = json.load(open(sys.argv[1]))
-federate = helics.helicsCreateMessageFederateFromConfig(sys.argv[1])
-helics.helicsFederateRegisterGlobalEndpoint(federate, "visitor/any")
-helics.helicsFederateEnterExecutingMode(federate)
-for k in range(config["tieline"]["intervals"]):
-    helics.helicsFederateRequestTime(federate, k / 60 + 3e-6)
-helics.helicsFederateDisconnect(federate)
-"""
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One harm.
-
-    Attributes:
-        fault: KILL, STOP, TERM, INT, INT INT, FILE LIMIT (no file of the process may grow) or
-            FULL DISK.
-        victim: launcher, keeper, broker, grid, network, together or visitor.
-        phase: start (the victim is there), running (the grid has recorded), finishing (the grid
-            has written its table) or whole (the result has its place, or nearly).
-        core: of the federation.
-        after_s: wall time from the phase's begin to the fault.
-        has_older: whether a whole result is at the target already.
-    """
-
-    fault: str
-    victim: str
-    phase: str
-    core: str
-    after_s: float
-    has_older: bool = False
-
-    @property
-    def kind(self) -> str:
-        """What it is counted under."""
-        return f"{self.fault} {self.victim}" if self.fault != "FULL DISK" else self.fault
-
-
-@dataclass
-class Finding:
-    """What came of a trial."""
-
-    trial: Trial
-    end_s: float = 0.0
-    clean_s: float = 0.0
-    exit_code: int | None = None
-    status: str = ""
-    reason: str = ""
-    last_valid_s: float | None = None
-    busy: float = 1.0
-    broken: list[str] = field(default_factory=list)
 
 
 def harm(
@@ -177,7 +114,7 @@ class _Run:
 
     def is_whole(self) -> bool:
         """Return whether the new result has its place."""
-        manifest = _read(self.out / "manifest.json")
+        manifest = read(self.out / "manifest.json")
         return manifest.get("status") == "complete" and manifest["label"] != "older"
 
     def note_ports(self) -> None:
@@ -190,13 +127,14 @@ class _Run:
                 self.ports = None if port is None else range(port, port + BLOCK)
 
     def processes(self) -> dict[int, str]:
-        """Return every living process of the run, with its command line, words apart by NUL."""
+        """Return every living process of the run: its name and its command line, apart by NUL."""
         found = {}
         mark = self._mark.encode()
         for path in Path("/proc").glob("[0-9]*"):
             with suppress(OSError):
                 if mark in (path / "environ").read_bytes().split(b"\0"):
-                    found[int(path.name)] = (path / "cmdline").read_bytes().decode()
+                    line = (path / "comm").read_text().strip() + "\0"
+                    found[int(path.name)] = line + (path / "cmdline").read_bytes().decode()
         return found
 
     def find(self, name: str) -> int | None:
@@ -333,104 +271,4 @@ def _look(run: _Run, trial: Trial, finding: Finding) -> Iterator[str]:
             yield f"{what} are left: {left}"
     if any(line.startswith("Traceback") for line in run.said.splitlines()):
         yield f"it showed a traceback: {run.said[-600:]}"
-    yield from _look_at_result(run, trial, finding)
-
-
-def _look_at_result(run: _Run, trial: Trial, finding: Finding) -> Iterator[str]:
-    folder = run.folder / "out-incomplete"
-    if trial.has_older and not (folder / "manifest.json").exists():
-        folder = run.out
-    elif trial.has_older:
-        if _read(run.out / "manifest.json").get("label") != "older":
-            yield "the older result is gone"
-        yield from whole(run.out, trial)
-    else:
-        folder = run.out
-    manifest = _read(folder / "manifest.json")
-    finding.status = manifest.get("status", "none")
-    finding.reason = manifest.get("reason") or ""
-    finding.last_valid_s = manifest.get("last_valid_s")
-    if finding.status == "complete":
-        # The fault came when all was done, or hit nobody who had still something to do.
-        is_older = manifest.get("label") == "older"
-        if is_older and finding.exit_code == 0:
-            yield "it said that all went well, and the older result is still there"
-        yield from whole(folder, trial)
-        return
-    if finding.exit_code == 0:
-        yield "the exit code is 0, and the result is not complete"
-    yield from _words(run, trial, finding, manifest)
-    yield from _incomplete(folder, trial, manifest)
-
-
-def _words(run: _Run, trial: Trial, finding: Finding, manifest: Any) -> Iterator[str]:
-    """Yield what is wrong with what was said of a run that is not complete."""
-    if not manifest:
-        if trial.phase != "start":
-            yield "there is no result folder"
-        return
-    if trial.fault.startswith("INT") or (trial.victim, trial.fault) == ("launcher", "TERM"):
-        if "interrupted" not in finding.reason:
-            yield f"the reason is not the interrupt: {finding.reason}"
-        return
-    names = {"together": ("grid", "network", "together")}.get(trial.victim, (trial.victim,))
-    if trial.fault == "FULL DISK":
-        names = ("grid", "network", "launcher", "together")
-    if not finding.reason.startswith(names):
-        yield f"{' or '.join(names)} is not named: {finding.reason}"
-    if trial.phase == "running" and GRANTED not in finding.reason:
-        yield f"the last granted time is not told: {finding.reason}"
-    first = finding.reason.splitlines()[0] if finding.reason else "-"
-    if first not in run.said:
-        yield f"the user was not told '{first}': {run.said[-600:]}"
-
-
-def whole(folder: Path, trial: Trial) -> Iterator[str]:
-    """Yield what a complete result lacks."""
-    manifest = _read(folder / "manifest.json")
-    if manifest.get("status") != "complete":
-        yield f"{folder.name} is not complete"
-    for name in ["summary.json", "run.json", *manifest.get("tables", ())]:
-        if not (folder / name).is_file():
-            yield f"{name} is missing in a complete result"
-    yield from unreadable(folder)
-
-
-def _incomplete(folder: Path, trial: Trial, manifest: Any) -> Iterator[str]:
-    if manifest and "last_valid_s" not in manifest:
-        yield "the manifest does not tell the last valid time"
-    yield from unreadable(folder)
-    streams = [path.name for path in folder.glob("*.arrows")]
-    if streams and trial.fault != "FULL DISK":
-        yield f"streams are left: {streams}"
-    until_s = manifest.get("last_valid_s")
-    grid = folder / "grid.parquet"
-    if until_s is not None and grid.exists():
-        t_s = pq.read_table(grid, columns=["t_s"]).column("t_s").to_pylist()
-        if not t_s or t_s[-1] < until_s or any(b <= a for a, b in pairwise(t_s)):
-            yield f"grid.parquet ends at {t_s[-1:]} s, the manifest says {until_s} s"
-    if trial.phase == "running" and until_s is None and trial.victim != "together":
-        yield "nothing is valid, though the grid had recorded"
-
-
-def unreadable(folder: Path) -> Iterator[str]:
-    """Yield the tables that cannot be read, in words."""
-    for path in folder.rglob("*.parquet"):
-        try:
-            pq.read_table(path)
-        except (OSError, ValueError) as error:
-            yield f"{path.name} cannot be read: {error}"
-
-
-def _read(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return {}
-
-
-def write_guest(folder: Path) -> str:
-    """Write the guest into a folder and return what an experiment says to have it."""
-    (folder / "guest.py").write_text(GUEST)
-    command = f"{sys.executable} guest.py {{config}}"
-    return f"  guests: [{{name: {VISITOR}, command: '{command}'}}]\n"
+    yield from look_at_result(run, trial, finding)

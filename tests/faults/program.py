@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import typer
 
 from cosim.dummy import COMMANDS
-from faults.harness import write_guest
+from faults.trial import write_guest
 from synthetic_result import EXPERIMENT, plan_of
 from tieline.console import reporting
 from tieline.experiment.launch import launch

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from faults.harness import VISITOR, Trial, harm
+from faults.harness import harm
+from faults.trial import VISITOR, Trial
 from synthetic_result import fake_launch, plan_of
 from tieline.experiment.run import execute
 
@@ -65,7 +66,7 @@ def test_a_harmed_run_ends_in_time_and_leaves_nothing_but_its_result(
 
 DISK = """
 import sys; sys.path.insert(0, sys.argv[1])
-from pathlib import Path; from faults.harness import Trial, harm
+from pathlib import Path; from faults.harness import harm; from faults.trial import Trial
 trial = Trial("FULL DISK", "disk", "running", "local", 0.1)
 finding = harm(trial, [sys.executable, *sys.argv[3:]], Path(sys.argv[2]), 60.0)
 print(finding.reason); sys.exit(str(finding.broken) if finding.broken else 0)

@@ -25,7 +25,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from faults.harness import VISITOR, Finding, Trial, harm, write_guest
+from faults.harness import harm
+from faults.trial import VISITOR, Finding, Trial, write_guest
 
 ROOT = Path(__file__).resolve().parents[2]
 AT_ONCE = 2

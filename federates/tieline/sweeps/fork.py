@@ -1,5 +1,6 @@
 """Starts a module as a process that inherits what its parent has imported already."""
 
+import ctypes
 import faulthandler
 import os
 import runpy
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 from typing import IO
 
 _FIRST_INHERITED = 3
+_PR_SET_NAME = 15
 
 
 @dataclass
@@ -36,6 +38,7 @@ def forked(command: Sequence[str], environment: Mapping[str, str]) -> Forked:
     reading, writing = zip(os.pipe(), os.pipe(), strict=True)
 
     def run() -> None:
+        _take_name(module)
         os.environ.clear()
         os.environ.update(environment)
         sys.argv = [module, *arguments]
@@ -69,6 +72,13 @@ def fork(run: Callable[[], None], output: Sequence[int]) -> int:
         sys.stderr.flush()
         # Not the parent's way out: what it would clean up there is the parent's.
         os._exit(code)
+
+
+def _take_name(module: str) -> None:
+    """Have `ps` and `top` show a module's own name, such as tieline-grid; only Linux knows how."""
+    if sys.platform.startswith("linux"):
+        name = f"tieline-{module.rpartition('.')[2]}"
+        ctypes.CDLL(None).prctl(_PR_SET_NAME, name.encode())
 
 
 def _settle_in(output: Sequence[int]) -> None:

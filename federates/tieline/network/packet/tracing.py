@@ -4,7 +4,7 @@ It computes what `PacketEngine` computes: while the packet is on its way the eve
 that concern it are processed one by one, and the memory is read before and after each.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +94,9 @@ class TracingEngine(PacketEngine):
         self._is_watching = False
         self._copies: list[_Copy] = []
         self._taken_at_end = self._event_ns = 0
-        super().__init__(spec, seed)
+        # With taps there is room for what is sent on links; it is noted from the packet's entry on.
+        super().__init__(replace(spec, taps=tuple(range(len(spec.links)))), seed)
+        self._memory.table("ports")[:, SPECIAL] &= ~HAS_TAP
         self._source = ends.source
         self._destination = ends.destination
         self._code = KINDS * (sequence * len(spec.sources) + ends.source) + FRAME
