@@ -13,6 +13,7 @@ import numpy as np
 from tieline.cosim.interfaces import GRID, NETWORK, Participant
 from tieline.cosim.together import main
 from tieline.grid.federate import open_participant as open_grid
+from tieline.grid.models.base import SIGNALS
 from tieline.network.federate import open_participant as open_network
 
 AT = 10
@@ -30,15 +31,8 @@ def lost_statistics(network: Any) -> None:
 
 def field_voltage(grid: Any) -> None:
     """An algebraic signal is no number."""
-    signal = grid._grid.signal
-
-    def spoilt(name: str) -> Any:
-        values = signal(name)
-        if name == "Efd":
-            values[6] = np.nan
-        return values
-
-    grid._grid.signal = spoilt
+    watch = grid._grid._watch
+    watch.scale[watch.quantity == SIGNALS.index("Efd"), 6] = np.nan
 
 
 def frequency(grid: Any) -> None:

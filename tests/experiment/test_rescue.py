@@ -30,6 +30,7 @@ def make(folder: Path, label: str, reason: str | None = UNDER_WAY) -> Path:
     folder.mkdir()
     status = "complete" if reason is None else "incomplete"
     manifest = {"format": FORMAT, "kind": "run", "status": status, "reason": reason, "label": label}
+    manifest |= {"name": "rescued", "config": {}}
     (folder / "manifest.json").write_text(json.dumps(manifest))
     (folder / ".run.json.part").write_text("{")
     if reason == UNDER_WAY:

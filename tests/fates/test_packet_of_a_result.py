@@ -71,6 +71,7 @@ def result(folder: Path, engine: str, intervals: int = 90) -> Path:
     }
     inputs = {"topology": hashlib.sha256(path.read_bytes()).hexdigest()}
     manifest = {"format": FORMAT, "kind": "run", "status": "complete", "inputs": inputs}
+    manifest |= {"name": "followed", "label": "", "config": {}}
     (folder / "run.json").write_text(json.dumps(run), encoding="utf-8")
     (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
     participant, clock = open_participant(run, folder), Clock(60, intervals)

@@ -11,6 +11,7 @@ from tieline.grid.loads import (
     UNSEEN,
     LoadCurrents,
     corrections,
+    hasten,
     load_laws,
     load_network,
     settle,
@@ -124,3 +125,10 @@ def test_frequency_scales_active_and_reactive_power_apart() -> None:
     ]
     assert drawn[1].real == pytest.approx(0.98 * drawn[0].real, abs=1e-13)
     assert drawn[1].imag == pytest.approx(1.03 * drawn[0].imag, abs=1e-13)
+
+
+def test_a_first_sweep_is_what_it_is_whatever_stands_in_memory() -> None:
+    """Or a run would give other bits, or collapse, by what the memory held before it."""
+    v, swept = np.full((2, 3), 1.0), np.array([[0.9, 0.8, 0.7], [0.1, 0.2, 0.3]])
+    hasten(v, swept, np.full((2, 3), np.nan), np.full((2, 3), np.inf), True)
+    np.testing.assert_array_equal(v, swept)

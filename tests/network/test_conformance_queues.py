@@ -79,7 +79,7 @@ BAD = [
     ),
     (
         "priority",
-        f"classes: [{{packets: 5, bytes: {10**30}}}]",
+        f"classes: [{{packets: 5, bytes: {10**15}}}]",
         "links.0.queue.classes.0.bytes must be less than or equal to 1073741824",
     ),
     (

@@ -94,10 +94,12 @@ def test_a_frame_is_let_go_with_its_last_packet(tmp_path):
     """Otherwise the memory of a long run would grow with it."""
     participant = open_participant(run_file(tmp_path, mean_delay=0.1), tmp_path)
     delivered(participant, 90)
-    kept = participant._frames._payloads
+    frames = participant._frames
+    kept = frames._sequences[frames._under_way > 0]
     # 0.1 s is six intervals; losses end a frame's packets, too.
     assert 5 <= len(kept) <= 8
     assert min(kept) >= 82
+    assert len(frames._sequences) <= 16
 
 
 def test_an_ideal_frame_comes_back_in_its_own_interval(tmp_path):

@@ -82,7 +82,9 @@ def test_a_federate_without_the_key_of_a_run_is_refused(core: str, tmp_path: Pat
         )
         said.append(done.stderr)
 
-    write_run(tmp_path, core, 20, {"grid": {}, "network": {}})
+    # Before the federates join: HELICS ends a federation under way that somebody tries to join.
+    slow = {"open_s": 4.0}
+    write_run(tmp_path, core, 20, {"grid": slow, "network": slow})
     launch(tmp_path, lambda _: None if said else knock(), commands=COMMANDS)
     assert "refused: " in said[0]
     assert "broker key does not match" in said[0] or "Unable to connect" in said[0]

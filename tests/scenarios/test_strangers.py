@@ -11,6 +11,7 @@ import pytest
 from cosim.stranger import ANYWHERE, OWN_WORDS, ROUNDS, TARGETS, payloads
 from scenarios.study import run
 from tieline.experiment.results import Run
+from tieline.logs import records
 
 SCRIPT = Path(__file__).parents[1] / "cosim" / "stranger.py"
 EXPERIMENT = f"""\
@@ -68,8 +69,9 @@ def test_every_message_that_was_dropped_is_counted_by_endpoint_and_sender(distur
 @pytest.mark.helics
 def test_the_log_tells_the_first_of_them_and_the_sum(disturbed: Run) -> None:
     """If not, nobody could find out who disturbs; if it told all, it would grow without end."""
-    log = (disturbed.folder / "logs" / "grid.log").read_text()
-    told = [line for line in log.splitlines() if "grid/bundle dropped a message" in line]
+    lines = [record.message for record in records(disturbed.folder) if record.process == "grid"]
+    log = "\n".join(lines)
+    told = [line for line in lines if "grid/bundle dropped a message" in line]
     assert len(told) == 5
     assert "of 'stranger/any': only network/bundle may send there; 100 bytes, which begin" in log
     assert "grid/bundle has dropped" in log

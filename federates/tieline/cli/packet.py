@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from tieline.cli.options import AsJson, Debug
-from tieline.console import reporting
-from tieline.units import quantity, seconds_to_ns
+from tieline.console import console_of, reporting
 
 
 def packet(
@@ -29,6 +27,7 @@ def packet(
 ) -> None:
     """Repeat the network of a run and say what became of one packet, link by link."""
     from tieline.fates import Asked, packet_fate, show
+    from tieline.units import quantity, seconds_to_ns
 
     with reporting(debug):
         sent_ns = None if sent_at is None else seconds_to_ns(quantity(sent_at, "time"))
@@ -36,4 +35,4 @@ def packet(
         if as_json:
             typer.echo(json.dumps(asdict(found), indent=2, ensure_ascii=False))
         else:
-            show(found, Console())
+            show(found, console_of())

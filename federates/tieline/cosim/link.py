@@ -79,6 +79,12 @@ class HelicsLink:
             granted_s = helics.helicsFederateRequestTime(self._federate, ns_to_seconds(at_ns))
         except helics.HelicsException as error:
             raise FederationEndedError(f"the federation ended: {error}") from error
+        if granted_s >= helics.HELICS_TIME_MAXTIME:
+            # So HELICS ends a federation under way that a further federate has tried to join.
+            raise FederationEndedError(
+                "the broker ended the federation before its time, as it does when a program of"
+                " somebody else's tries to join a run under way"
+            )
         return seconds_to_ns(granted_s)
 
     def send(self, data: bytes, at_ns: int) -> None:

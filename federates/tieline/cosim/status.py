@@ -66,8 +66,11 @@ class Status:
         self._waits = True
 
     def grant(self, k: int, granted_ns: int) -> None:
-        """Note a grant; the next line tells it."""
+        """Note a grant; the next line tells it, and the first is told at once."""
+        is_first = self._granted_ns < 0
         self._k, self._granted_ns, self._waits = k, granted_ns, False
+        if is_first:
+            self.write()
 
     def fail(self, reason: str, fault: Fault, exit_code: int) -> None:
         """Enter `failed`; only the first reason counts."""

@@ -206,8 +206,10 @@ def hasten(v: Floats, swept: Floats, last_move: Floats, last_swept: Floats, is_f
     share = share if abs(share) <= 0.5 else 0.0
     for row in range(2):
         for k in range(v.shape[1]):
+            # At the first sweep the last one's memory may hold anything, also what is no number.
+            step_back = 0.0 if share == 0.0 else share * (swept[row, k] - last_swept[row, k])
             last_move[row, k] = swept[row, k] - v[row, k]
-            v[row, k] = swept[row, k] - share * (swept[row, k] - last_swept[row, k])
+            v[row, k] = swept[row, k] - step_back
             last_swept[row, k] = swept[row, k]
 
 
