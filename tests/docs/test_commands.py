@@ -41,7 +41,8 @@ ONLY_PARSED = {
     r"--scheduler": "tests/sweeps runs two workers",
     r"^damping": "tests/test_cli_linear.py runs it on a real result",
     r"^(modes|freqresp) miniwecc": "tests/test_cli_linear.py and tests/linear run shorter ones",
-    r"^(report|compare|log) results/": "stands for a folder of the reader's",
+    r"^(report|compare) results/": "stands for a folder of the reader's",
+    r"^log": "tests/doctor prints the logs of a run whose processes were real",
     r"^topology import": "tests/network imports networks of all kinds",
     r"guest_controller": "tests/scenarios runs the guest",
 }

@@ -34,10 +34,11 @@ _MARK = "TIELINE_TRIAL"
 _LOOK_S = 0.02
 _LISTENS = "0A"
 _COMMANDS = {
+    # A fork's name, of which the kernel keeps 15 letters, comes before its command line.
     "broker": r"tieline\.cosim\.broker|^tieline-broker",
     "grid": r"tieline\.grid\b|dummy\.py\0grid\0|^tieline-grid",
     "network": r"tieline\.network\b|dummy\.py\0network\0|^tieline-network",
-    "together": r"tieline\.cosim\.together|dummy\.py\0together\0|^tieline-together",
+    "together": r"tieline\.cosim\.together|dummy\.py\0together\0|^tieline-togethe",
     "keeper": r"strays\.py",
     VISITOR: r"guest\.py",
 }
@@ -241,17 +242,12 @@ def fill(folder: Path) -> None:
 def _await_end(run: _Run, trial: Trial, finding: Finding, begin_s: float) -> None:
     def is_over() -> bool:
         # The launcher's own death is no end: what it leaves must end, too.
-        if run.is_alive():
-            # All that is left is to draw, which the fault could not hinder any more.
-            return trial.victim != "launcher" and run.is_whole()
-        return not (trial.victim == "launcher" and run.processes())
+        return not run.is_alive() and not (trial.victim == "launcher" and run.processes())
 
     _await("the end", is_over, PATIENCE_S)
     finding.end_s = time.monotonic() - begin_s
     finding.exit_code = run.launcher.returncode
     finding.busy = max(1.0, os.getloadavg()[0] / len(os.sched_getaffinity(0)))
-    if run.is_alive():
-        run.clear()
 
     def is_clean() -> bool:
         return not (run.processes() or run.listening() or run.leftovers())
