@@ -108,7 +108,7 @@ FAULTS: dict[str, tuple[str, Callable[[Trial], None]]] = {
     "SIGKILL of the broker": ("broker", lambda t: t.signal(t.way.broker, signal.SIGKILL)),
     "SIGKILL of the launcher": ("", lambda t: t.launcher.kill()),
     "a federate never starts": ("other", lambda t: None),
-    "full disk": ("victim", fill_disk),
+    "full disk": ("any", fill_disk),
     "Ctrl-C": ("", lambda t: os.killpg(t.launcher.pid, signal.SIGINT)),
     "leftover broker on the port": ("", lambda t: None),
     "malformed messages": ("", lambda t: None),
@@ -122,8 +122,10 @@ def culprits(way: Way, who: str) -> list[str]:
         return []
     if who == "broker":
         return ["broker: ", "Process broker has failed"]
-    name = way.victim[1] if who == "victim" else way.other[1]
-    return [f"{name}: ", f"Process {name} has failed"]
+    names = {"victim": (way.victim[1],), "other": (way.other[1],)}.get(
+        who, (way.victim[1], way.other[1], "launcher")
+    )
+    return [word for name in names for word in (f"{name}: ", f"Process {name} has failed")]
 
 
 def measured(way: Way, fault: str) -> Result:

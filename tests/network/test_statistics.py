@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tieline.network.ended import NONE_ENDED, Ended, ended
 from tieline.network.engine import ARRIVAL, DROP, LOSS, QUEUE_FULL
-from tieline.network.histogram import BINS, Histograms, bin_of, count, middle_ns
+from tieline.network.histogram import BINS, Histograms, _rank, bin_of, count, middle_ns
 from tieline.network.stats import DELAY_BIN_NS, FlowStatistics
 from tieline.streams import stream
 
@@ -132,3 +132,15 @@ def test_the_nearest_rank_of_few_counts():
             few.grow()
     for share, excess_ns in ((0.25, 3 << 10), (0.26, 10 << 10), (0.75, 10 << 10), (1.0, 1 << 30)):
         assert few.percentiles_ns(share)[1] == middle_ns(bin_of(excess_ns))
+
+
+@pytest.mark.parametrize("is_compiled", [True, False])
+def test_percentiles_are_the_same_with_and_without_the_compiler(is_compiled: bool) -> None:
+    """A run without the compiler is what tells an error of the compiler from one of ours."""
+    histograms = Histograms(1)
+    for excess_us in (5, 5, 5, 900, 900, 70_000):
+        count(0, 1_000 * excess_us, histograms.block_of, histograms.counts, histograms.used)
+    rank = _rank if is_compiled else getattr(_rank, "py_func", _rank)
+    bins = np.zeros(1, np.int64)
+    rank(0.5, histograms.block_of, histograms.counts, bins)
+    assert middle_ns(bins) == pytest.approx(5_000, abs=1_024)

@@ -96,12 +96,13 @@ def _rank(
         for part in range(block_of.shape[1]):
             if block_of[flow, part] >= 0:
                 for place in range(_HALF):
-                    total += counts[block_of[flow, part], place]
+                    total += np.int64(counts[block_of[flow, part], place])
         left = max(1, int(np.ceil(share * total)))
         for part in range(block_of.shape[1]):
             if block_of[flow, part] < 0:
                 continue
             for place in range(_HALF):
                 if left > 0:
-                    left -= counts[block_of[flow, part], place]
+                    # Plain NumPy would take the difference for one of unsigned numbers.
+                    left -= np.int64(counts[block_of[flow, part], place])
                     bins[flow] = _HALF * part + place
