@@ -14,6 +14,7 @@ The exit code is 1 if a process grew beyond the bounds below, or a table differs
 import argparse
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -126,11 +127,13 @@ def look(pid: int) -> tuple[str, float] | None:
     """Return a process's name and resident memory in MB; None if it has ended."""
     try:
         words = Path(f"/proc/{pid}/cmdline").read_bytes().decode().split("\0")
+        # A fork has its parent's command line and a name of its own.
+        words += Path(f"/proc/{pid}/comm").read_text(encoding="ascii").split()
         pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
     except (OSError, IndexError):
         return None
-    module = next((word for word in words if word.startswith("tieline.")), "launcher")
-    return module.rpartition(".")[2], pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+    module = next((word for word in words if re.match(r"tieline[.-]\w", word)), "launcher")
+    return re.split(r"[.-]", module)[-1], pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def running(folder: Path) -> tuple[float, float]:
