@@ -90,9 +90,11 @@ def test_a_status_says_what_a_launcher_needs_and_only_the_first_failure(tmp_path
             status.fail("it broke", "own", 3)
             status.fail("it broke again", "other", 4)
     lines = [json.loads(line) for line in path.read_text().splitlines()]
-    assert [line["state"] for line in lines] == ["running", "failed"]
-    del lines[1]["cpu_s"]
-    assert lines[1] == {
+    # The first grant is told at once, later ones by the heartbeat.
+    assert [line["state"] for line in lines] == ["running", "running", "failed"]
+    assert [line["granted_ns"] for line in lines] == [-1, 50_000_000, 50_000_000]
+    del lines[2]["cpu_s"]
+    assert lines[2] == {
         "federate": "grid",
         "state": "failed",
         "k": 3,
