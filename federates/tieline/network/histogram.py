@@ -92,12 +92,12 @@ def _rank(
     share: float, block_of: NDArray[np.int32], counts: NDArray[np.uint32], bins: NDArray[np.int64]
 ) -> None:
     for flow in range(len(block_of)):
-        total = 0
+        total = np.int64(0)
         for part in range(block_of.shape[1]):
             if block_of[flow, part] >= 0:
                 for place in range(_HALF):
                     total += np.int64(counts[block_of[flow, part], place])
-        left = max(1, int(np.ceil(share * total)))
+        left = np.int64(max(1, int(np.ceil(share * total))))
         for part in range(block_of.shape[1]):
             if block_of[flow, part] < 0:
                 continue
