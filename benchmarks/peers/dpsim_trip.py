@@ -1,7 +1,7 @@
 """DPsim's time for 40 s of a network like the miniWECC with a generator trip, as JSON.
 
-Run by `benchmarks/grid_alone.py --dpsim PYTHON` with an interpreter that has `dpsim` installed. The
-first argument names a file with the same buses, branches, loads and units as ours at the same
+Run by hand, as benchmarks/README.md says, with an interpreter that has `dpsim` installed. The first
+argument names a file with the same buses, branches, loads and units as ours at the same
 operating point, in SI units; the second says how often to run. Loads are impedances, transformers
 have their series impedance alone (turns ratio one), and each unit has DPsim's nearest models: the
 6th-order machine, the static exciter, the type-1 governor and PSS1A. Phasors (domain SP), 1/120 s.
