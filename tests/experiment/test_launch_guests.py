@@ -71,7 +71,7 @@ def test_a_guest_that_hangs_is_named(tmp_path: Path) -> None:
 
 def test_a_guest_that_never_joins_is_named(tmp_path: Path) -> None:
     """If not, a slip in a command line would look like a fault of tieline."""
-    write_run(tmp_path, "zmq", LONG, {}, start_timeout=10.0)
+    write_run(tmp_path, "zmq", LONG, {}, hang_timeout=1.5)
     run = json.loads((tmp_path / "run.json").read_text())
     run["federation"]["guests"] = [{"name": "absent", "command": "sleep 60"}]
     run["guest_directory"] = str(tmp_path)

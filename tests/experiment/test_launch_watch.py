@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import pytest
 
+from tieline.cosim.guests import GuestSettings
 from tieline.cosim.interfaces import FederationSettings
 from tieline.experiment.watch import LONG_S, PATIENCE, Effort, Progress, Suspect, Watch
 
@@ -53,14 +54,17 @@ def let_pass(watch: Watch, seconds: float) -> None:
         watch.pass_time(0.1)
 
 
-def silence(watch: Watch, works: bool, seconds: float) -> Suspect | None:
+def silence(
+    watch: Watch, works: bool, seconds: float, guest: FakeProcess | None = None
+) -> Suspect | None:
     """Return who is suspected first in a silence in which the federates' processes work, or not."""
-    all_three = {name: FakeProcess(works=works) for name in ("broker", "grid", "network")}
+    everyone = {name: FakeProcess(works=works) for name in ("broker", "grid", "network")}
+    everyone |= {} if guest is None else {"visitor": guest}
     for _ in range(round(seconds / 0.1)):
         watch.pass_time(0.1)
-        for process in all_three.values():
+        for process in everyone.values():
             process.passed_s += 0.1
-        suspect = watch.suspect(all_three)
+        suspect = watch.suspect(everyone)
         if suspect is not None:
             return suspect
     return None
@@ -222,6 +226,23 @@ def test_a_start_in_which_nobody_works_is_over_soon() -> None:
     suspect = silence(watch_of(*words), False, 2.5)
     assert suspect is not None
     assert suspect.name == "network"
+
+
+@pytest.mark.parametrize(("works", "limit_s"), [(False, 2.0), (True, 5.0), (None, 5.0)])
+def test_a_guest_that_does_not_join_is_waited_for_only_while_it_works(
+    works: bool | None, limit_s: float
+) -> None:
+    """If not, a slip in its command line would hold the run, or a slow program would be cut off."""
+    visitor = GuestSettings(name="visitor", command="visit {config}")
+    settings = FederationSettings(hang_timeout=2.0, start_timeout=5.0, guests=(visitor,))
+    watch = Watch(settings)
+    for name in ("grid", "network"):
+        watch.hear(word(name, "joining", k=-1))
+    guest = FakeProcess(works=works)
+    assert silence(watch, False, limit_s - 0.2, guest) is None
+    suspect = silence(watch, False, 0.5, guest)
+    assert named(suspect) == "visitor"
+    assert "has not joined the federation" in str(suspect)
 
 
 def test_a_stopped_process_is_named_before_the_limit_of_a_long_run() -> None:

@@ -19,8 +19,8 @@ from tieline.logs import LINE_BEGINS, Log, Record
 from tieline.threads import one_thread
 
 _READ_BYTES = 65_536
-_UTIME = 11
-"""Place of the processor time among the fields after a process's name in /proc/PID/stat."""
+_GROUP, _UTIME = 2, 11
+"""Places of group and processor time among the fields after the name in /proc/PID/stat."""
 _LONGEST_LINE_BYTES = 1_000_000
 
 
@@ -273,15 +273,29 @@ def child_environment(run: Path | None = None) -> dict[str, str]:
     return dict(os.environ) | shared_environment(os.environ) | own
 
 
-def effort_of(pid: int) -> Effort | None:
-    """Return what a living process has done so far; None where the kernel does not tell."""
+def effort_of(group: int) -> Effort | None:
+    """Return what the living processes of a group have done; None where the kernel does not tell.
+
+    A program that another one started, such as a shell, works in its group.
+    """
+    efforts = [effort for path in Path("/proc").glob("[0-9]*") if (effort := _effort(path, group))]
+    if not efforts:
+        return None
+    cpu_s = sum(effort.cpu_s for effort in efforts)
+    return Effort(cpu_s, sum(effort.disk_bytes for effort in efforts))
+
+
+def _effort(process: Path, group: int) -> Effort | None:
     try:
-        stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
-        io = Path(f"/proc/{pid}/io").read_text(encoding="ascii")
+        stat = (process / "stat").read_text(encoding="ascii", errors="replace")
+        fields = stat.rpartition(")")[2].split()
+        if int(fields[_GROUP]) != group:
+            return None
+        io = (process / "io").read_text(encoding="ascii")
     except OSError:
         return None
-    fields = stat.rpartition(")")[2].split()
-    ticks = int(fields[_UTIME]) + int(fields[_UTIME + 1])
+    # Its own, in user and system mode, and that of its children that have ended.
+    ticks = sum(map(int, fields[_UTIME : _UTIME + 4]))
     moved = dict(line.split(": ") for line in io.splitlines())
     disk_bytes = int(moved["read_bytes"]) + int(moved["write_bytes"])
     return Effort(ticks / os.sysconf("SC_CLK_TCK"), disk_bytes)

@@ -78,7 +78,8 @@ class Watch:
     How long a silence may last depends on what the federates' processes do in it. If none of them
     works, `hang_timeout` is the limit in any phase. If one does, the run's own longest meeting so
     far sets it, times `PATIENCE`, where that is longer; before there is one, and while results are
-    written, `LONG_S` does. Guests may wait for something outside: how much they work is no sign.
+    written, `LONG_S` does. Once all have joined, guests may wait for something outside: how much
+    they work is no sign then. Before, all that they have to do is to join.
 
     Args:
         settings: of the federation.
@@ -106,6 +107,7 @@ class Watch:
         self._meeting_s = 0.0
         self._efforts: tuple[float, dict[str, Effort]] | None = None
         self._works_on: bool | None = None
+        self._guests_work: bool | None = None
 
     def hear(self, message: Mapping[str, Any]) -> Progress | None:
         """Take one word in; return it as progress, or None when it is not a federate's."""
@@ -165,7 +167,7 @@ class Watch:
         self._cpu_s[name] = _cpu_s(message)
         self.silence_s = 0.0
         self._efforts = None
-        self._works_on = None
+        self._works_on = self._guests_work = None
 
     def _look_for_work(self, processes: Mapping[str, Process]) -> None:
         """Compare what the federates' processes have done over half the limit, before it is up."""
@@ -175,7 +177,7 @@ class Watch:
         now = {
             name: effort
             for name, process in processes.items()
-            if name not in self._guests and (effort := process.effort()) is not None
+            if (effort := process.effort()) is not None
         }
         if self._efforts is None:
             self._efforts = (self.silence_s, now)
@@ -184,19 +186,20 @@ class Watch:
         elapsed_s = self.silence_s - since_s
         if elapsed_s < limit_s / 2:
             return
-        known = before.keys() & now.keys()
-        # Of all together: on a busy machine none gets much.
-        cpu_s = sum(now[name].cpu_s - before[name].cpu_s for name in known)
-        reads_or_writes = any(now[name].disk_bytes > before[name].disk_bytes for name in known)
-        works = cpu_s >= _WORKING_SHARE * elapsed_s or reads_or_writes
-        # One that died, or is on another host, may have worked: then nobody is called idle.
-        alive = {
-            name
-            for name, process in processes.items()
-            if name not in self._guests and process.exit_code is None
+        done = {
+            name: Effort(
+                now[name].cpu_s - before[name].cpu_s,
+                now[name].disk_bytes - before[name].disk_bytes,
+            )
+            for name in before.keys() & now.keys()
         }
-        is_known = before.keys() == now.keys() == alive
-        self._works_on = True if works else False if is_known else None
+        alive = {name for name, process in processes.items() if process.exit_code is None}
+        # One that died, or is on another host, may have worked: then nobody is called idle.
+        known = {name for name in alive | before.keys() if name in done}
+        unknown = (alive | before.keys()) - known
+        guests = set(self._guests)
+        self._works_on = _works(done, known - guests, unknown - guests, elapsed_s)
+        self._guests_work = _works(done, known & guests, unknown & guests, elapsed_s)
         self._efforts = (self.silence_s, now)
 
     def _works(self, name: str, message: Mapping[str, Any]) -> bool:
@@ -276,7 +279,8 @@ class Watch:
                 return max(least_s, LONG_S), what
             return max(least_s, self._learned_s), what
         what, start_s = "it has not joined the federation", self._settings.start_timeout
-        if self._works_on is False and not self._has_guests_turn():
+        is_idle = self._works_on is False
+        if is_idle and (not self._has_guests_turn() or self._guests_work is False):
             return min(least_s, start_s), what
         return start_s, what
 
@@ -320,6 +324,17 @@ class Watch:
 
 def _place(message: Mapping[str, Any]) -> tuple[Any, Any]:
     return message.get("state"), message.get("k")
+
+
+def _works(
+    done: Mapping[str, Effort], known: set[str], unknown: set[str], elapsed_s: float
+) -> bool | None:
+    """Return whether processes have worked; None if one that is not known of may have."""
+    # Of all together: on a busy machine none gets much.
+    cpu_s = sum(done[name].cpu_s for name in known)
+    if cpu_s >= _WORKING_SHARE * elapsed_s or any(done[name].disk_bytes > 0 for name in known):
+        return True
+    return None if unknown else False
 
 
 def _cpu_s(message: Mapping[str, Any]) -> float:
