@@ -23,6 +23,9 @@ from tieline.errors import CosimError, NumericalError
 if TYPE_CHECKING:
     import pandas as pd
 
+# Arrow's other pools keep what is freed: after a long table was read, 100 MB and more.
+pa.set_memory_pool(pa.system_memory_pool())
+
 _STREAM_SUFFIX = ".arrows"
 _SUFFIXES = (".parquet", _STREAM_SUFFIX)
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -180,7 +183,9 @@ def readable_tables(folder: Path) -> list[Path]:
 def read_whole(path: Path, columns: Sequence[str] | None = None) -> Any:
     """Return a table, or some of its columns, as Arrow's; of a stream, its whole batches."""
     if path.suffix != _STREAM_SUFFIX:
-        return pq.read_table(path, columns=None if columns is None else list(columns))
+        with pq.ParquetFile(path) as table:
+            # One thread: several would each keep memory of their own.
+            return table.read(None if columns is None else list(columns), use_threads=False)
     with pa.OSFile(str(path), "rb") as source:
         reader = pa.ipc.open_stream(source)
         table = pa.Table.from_batches(_whole_batches(reader), reader.schema)
@@ -226,12 +231,7 @@ def write_table(path: Path, columns: Sequence[Column], data: Mapping[str, ArrayL
 
 def read_table(path: Path, columns: Sequence[str] | None = None) -> "pd.DataFrame":
     """Return a table, or some of its columns; nulls in a column of floats become NaN."""
-    # Federates write tables and read none: they should not wait for pandas.
-    import pandas as pd
-
-    if path.suffix == _STREAM_SUFFIX:
-        return read_whole(path, columns).to_pandas()
-    return pd.read_parquet(path, columns=None if columns is None else list(columns))
+    return read_whole(path, columns).to_pandas()
 
 
 def column_names(path: Path) -> list[str]:

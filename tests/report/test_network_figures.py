@@ -15,6 +15,7 @@ from tieline.report.network_figures import (
     draw,
     has_series,
 )
+from tieline.report.windowed import Windowed
 
 
 def test_a_run_with_series_gets_its_figures(tmp_path: Path) -> None:
@@ -35,6 +36,13 @@ def test_a_run_without_series_is_refused(tmp_path: Path) -> None:
         draw(tmp_path / "r")
 
 
+def windowed(folder: Path, table: pd.DataFrame, *keys: str) -> Windowed:
+    """Return a table as the figures read it."""
+    path = folder / f"{len(list(folder.iterdir()))}.parquet"
+    table.to_parquet(path)
+    return Windowed(path, *keys)
+
+
 def series_of(units: dict[str, float]) -> pd.DataFrame:
     """Return a series of controllers of constant delay and age, s."""
     names = ("delay_mean_s", "delay_p50_s", "delay_p95_s", "age_mean_s", "age_max_s")
@@ -47,22 +55,24 @@ def series_of(units: dict[str, float]) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize("figure_of", [controller_delays, controller_ages])
-def test_slowest_middle_and_fastest_are_drawn(figure_of) -> None:
+def test_slowest_middle_and_fastest_are_drawn(figure_of, tmp_path: Path) -> None:
     """Otherwise the controller in trouble could be the one that is not shown."""
-    figure = figure_of(series_of({"A": 0.2, "B": 0.5, "C": 0.3, "D": 0.1, "E": 0.4, "F": np.nan}))
+    delays = {"A": 0.2, "B": 0.5, "C": 0.3, "D": 0.1, "E": 0.4, "F": np.nan}
+    figure = figure_of(windowed(tmp_path, series_of(delays), "unit"))
     assert [axes.get_title() for axes in figure.axes] == ["B", "C", "D"]
     assert figure.axes[0].get_yscale() == "linear"
-    wide = figure_of(series_of({"A": 0.1, "B": 2.0}))
+    wide = figure_of(windowed(tmp_path, series_of({"A": 0.1, "B": 2.0}), "unit"))
     assert [axes.get_title() for axes in wide.axes] == ["B", "A"]
     assert wide.axes[0].get_yscale() == "log"
 
 
-def test_a_window_without_a_row_is_drawn_as_an_idle_link() -> None:
+def test_a_window_without_a_row_is_drawn_as_an_idle_link(tmp_path: Path) -> None:
     """Otherwise a line would run straight across a silence."""
     row = {"from": "a", "to": "b", "utilisation": 0.5, "max_queue": 3, "dropped_loss": 1}
     other = row | {"from": "b", "to": "a", "utilisation": 0.1}
     rows = [row | {"t_s": 0.1}, other | {"t_s": 0.2}, row | {"t_s": 0.3}]
-    figure = busiest_links(pd.DataFrame(rows).assign(dropped_queue=2, dropped_down=0))
+    table = pd.DataFrame(rows).assign(dropped_queue=2, dropped_down=0)
+    figure = busiest_links(windowed(tmp_path, table, "from", "to"))
     load, queue, drops = (axes.lines[0].get_ydata().tolist() for axes in figure.axes)
     assert (load, queue, drops) == ([50.0, 0.0, 50.0], [3, 0, 3], [3, 3, 6])
     assert figure.legends[0].get_texts()[0].get_text() == "a to b"

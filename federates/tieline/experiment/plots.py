@@ -139,9 +139,8 @@ def drawn_unit(run: Run) -> str:
     if chosen:
         return str(chosen)
     lost = {f"vt_pu.{unit}" for unit in run.tripped_units()}
-    names = run.columns("grid")
-    grid = run.table("grid", *(n for n in names if n.startswith("vt_pu.") and n not in lost))
-    swings = grid.max() - grid.min()
+    names = [n for n in run.columns("grid") if n.startswith("vt_pu.") and n not in lost]
+    swings = pd.concat([block.max() - block.min() for block in run.blocks("grid", names)])
     return str(swings.idxmax()).removeprefix("vt_pu.")
 
 

@@ -1,12 +1,13 @@
 """Reads result folders: a run, or a sweep of runs; knows nothing of how they were made."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tieline.experiment.folder import FORMAT, MANIFEST, is_result, read_json, read_manifest
 from tieline.experiment.table_hash import table_hash
+from tieline.table_parts import row_count
 from tieline.tables import column_names, read_table, stored
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ __all__ = [
 SUMMARY = "summary.json"
 POINTS = "points"
 MAP = "map.json"
+_VALUES_AT_ONCE = 300_000
 
 
 @dataclass(frozen=True)
@@ -68,18 +70,29 @@ class Run:
         """Return the summary."""
         return read_json(self.folder / SUMMARY)
 
+    def path(self, name: str) -> Path | None:
+        """Return the file of a table; None if it was not written."""
+        return stored(self.folder / f"{name}.parquet")
+
     def table(self, name: str, *columns: str) -> "pd.DataFrame":
         """Return a table (`grid`, `flows`, ...), or some columns; no rows if it was not written."""
-        path = stored(self.folder / f"{name}.parquet")
+        path = self.path(name)
         if path is not None:
             return read_table(path, columns or None)
         import pandas as pd
 
         return pd.DataFrame()
 
+    def blocks(self, name: str, columns: Sequence[str]) -> "Iterator[pd.DataFrame]":
+        """Yield some columns of a table that was written, as many at a time as are a few MB."""
+        path = self.path(name)
+        at_once = 1 if path is None else max(1, _VALUES_AT_ONCE // max(1, row_count(path)))
+        for first in range(0, len(columns), at_once):
+            yield self.table(name, *columns[first : first + at_once])
+
     def columns(self, name: str) -> list[str]:
         """Return the names of a table's columns; none if it was not written."""
-        path = stored(self.folder / f"{name}.parquet")
+        path = self.path(name)
         return [] if path is None else column_names(path)
 
     def events(self) -> list[tuple[float, str]]:

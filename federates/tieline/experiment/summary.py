@@ -25,9 +25,6 @@ RING_DOWN_RATE_HZ = 20.0
 
 DEFAULT_BAND_HZ = (0.2, 0.8)
 
-_NEEDED = ("t_s", "coi_pu", "speed_pu.", "age_s.", "vt_pu.")
-"""How the columns of the grid's table begin that the summary looks at."""
-
 
 def summarise(run: Run) -> dict[str, Any]:
     """Return the summary of a run: plain numbers, None where there is nothing to tell.
@@ -35,8 +32,8 @@ def summarise(run: Run) -> dict[str, Any]:
     Raises:
         InputError: the run's files cannot be read.
     """
-    # Not all of its columns: those of a long run take more memory than the run itself.
-    grid = run.table("grid", *(name for name in run.columns("grid") if name.startswith(_NEEDED)))
+    # Never all of its columns at once: those of a long run take more memory than the run itself.
+    grid = run.table("grid", "t_s", "coi_pu")
     told = run.told()
     return {
         "label": run.label,
@@ -45,8 +42,8 @@ def summarise(run: Run) -> dict[str, Any]:
         "swing": _swing(run, grid, told.get("tie_mode")),
         "delay": _delay(run),
         "packets": _packets(run.table("flows")),
-        "age": _age(grid),
-        "lowest_voltage": _lowest_voltage(run, grid),
+        "age": _age(run),
+        "lowest_voltage": _lowest_voltage(run),
         "times": run.manifest.get("times", {}),
     }
 
@@ -78,7 +75,8 @@ def _swing(run: Run, grid: "pd.DataFrame", tie_mode: Mapping[str, Any] | None) -
     band_hz = tuple(tie_mode.get("band_Hz", DEFAULT_BAND_HZ))
     groups = {"units": list(tie_mode["units"]), "against": list(tie_mode["against"])}
     lost = run.tripped_units() & {*groups["units"], *groups["against"]}
-    missing = [u for group in groups.values() for u in group if f"speed_pu.{u}" not in grid]
+    known = set(run.columns("grid"))
+    missing = [u for group in groups.values() for u in group if f"speed_pu.{u}" not in known]
     if lost or missing:
         return _no_swing(f"no speed of {', '.join(sorted(lost) or missing)} to compare with")
     time_s = _values(grid, "t_s")
@@ -88,7 +86,7 @@ def _swing(run: Run, grid: "pd.DataFrame", tie_mode: Mapping[str, Any] | None) -
     step_s = float(time_s[1] - time_s[0]) if len(time_s) > 1 else 1.0
     thin = max(1, round(1 / (RING_DOWN_RATE_HZ * step_s)))
     window = window[::thin]
-    difference = _mean_speed(grid, groups["units"]) - _mean_speed(grid, groups["against"])
+    difference = _mean_speed(run, groups["units"]) - _mean_speed(run, groups["against"])
     found = ring_down(difference[window], thin * step_s, (band_hz[0], band_hz[1]))
     about = {"window_s": [float(begin_s), float(end_s)], "band_hz": list(band_hz), **groups}
     if found.mode is None:
@@ -108,8 +106,10 @@ def _no_swing(reason: str | None) -> dict[str, Any]:
     return {"frequency_hz": None, "damping_ratio": None, "reason": reason}
 
 
-def _mean_speed(grid: "pd.DataFrame", units: list[str]) -> NDArray[np.float64]:
-    return np.mean([_values(grid, f"speed_pu.{unit}") for unit in units], axis=0)
+def _mean_speed(run: Run, units: list[str]) -> NDArray[np.float64]:
+    names = [f"speed_pu.{unit}" for unit in units]
+    blocks = run.blocks("grid", names)
+    return np.mean([_values(block, name) for block in blocks for name in map(str, block)], axis=0)
 
 
 def _delay(run: Run) -> dict[str, Any]:
@@ -154,32 +154,39 @@ def _packets(flows: "pd.DataFrame") -> dict[str, Any]:
     return totals | {"loss": lost / ended if ended else 0.0}
 
 
-def _age(grid: "pd.DataFrame") -> dict[str, Any]:
+def _age(run: Run) -> dict[str, Any]:
     """Mean age of the data that each controller holds, over the time that it holds any."""
     prefix = "age_s."
+    names = [name for name in run.columns("grid") if name.startswith(prefix)]
     means = {
-        column.removeprefix(prefix): float(grid[column].mean())
-        for column in grid.columns
-        if column.startswith(prefix) and grid[column].notna().any()
+        column.removeprefix(prefix): float(block[column].mean())
+        for block in run.blocks("grid", names)
+        for column in map(str, block)
+        if block[column].notna().any()
     }
     mean = float(np.mean(list(means.values()))) if means else None
     return {"mean_s": mean, "controllers_s": means}
 
 
-def _lowest_voltage(run: Run, grid: "pd.DataFrame") -> dict[str, Any] | None:
+def _lowest_voltage(run: Run) -> dict[str, Any] | None:
     """The unit in service with the lowest terminal voltage of the run."""
     prefix = "vt_pu."
     lost = {prefix + unit for unit in run.tripped_units()}
-    columns = [name for name in grid.columns if name.startswith(prefix) and name not in lost]
-    if not columns:
+    names = [name for name in run.columns("grid") if name.startswith(prefix) and name not in lost]
+    if not names:
         return None
-    lowest = grid[columns].min()
-    column = str(lowest.idxmin())
-    row = int(grid[column].to_numpy().argmin())
+    lowest = {
+        name: float(block[name].min())
+        for block in run.blocks("grid", names)
+        for name in map(str, block)
+    }
+    column = min(lowest, key=lambda name: lowest[name])
+    of_it = run.table("grid", "t_s", column)
+    row = int(_values(of_it, column).argmin())
     return {
         "unit": column.removeprefix(prefix),
-        "vt_pu": float(lowest[column]),
-        "t_s": float(_values(grid, "t_s")[row]),
+        "vt_pu": lowest[column],
+        "t_s": float(_values(of_it, "t_s")[row]),
     }
 
 

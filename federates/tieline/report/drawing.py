@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from tieline.experiment.results import Run
-from tieline.report.store import Store, rows_of
-from tieline.report.traffic_curves import directions
+from tieline.report.packing import thinned
+from tieline.report.store import Store, columns_of, rows_of
+from tieline.report.traffic_curves import direction
 
 
 def drawing(store: Store, run: Run) -> dict[str, Any] | None:
@@ -36,7 +37,7 @@ def drawing(store: Store, run: Run) -> dict[str, Any] | None:
             station | {"frequency": _frequency(store, station, units)}
             for station in found["stations"]
         ],
-        "links": _links(run, found),
+        "links": _links(store, found),
         "nominal_hz": float(run.told()["frequency_hz"]),
         "with_voltages": "vbus" in store.tables,
     }
@@ -46,9 +47,19 @@ def _put_voltages(store: Store, run: Run, found: Mapping[str, Any]) -> None:
     buses = [f"B{station['bus']}" for station in found["stations"]]
     names = [f"v_pu.{bus}" for bus in buses]
     if names and set(names) <= set(run.columns("grid")):
-        grid = run.table("grid", "t_s", *dict.fromkeys(names))
-        time_s = grid["t_s"].to_numpy(dtype=np.float64)
-        store.put("vbus", "grid", time_s, rows_of(grid, "v_pu", buses))
+        time_s = run.table("grid", "t_s")["t_s"].to_numpy(dtype=np.float64)
+        blocks = run.blocks("grid", list(dict.fromkeys(names)))
+        found_rows = {
+            bus: row
+            for block in blocks
+            for bus, row in zip(
+                columns_of(block, "v_pu"),
+                thinned(time_s, rows_of(block, "v_pu", columns_of(block, "v_pu")))[1],
+                strict=True,
+            )
+        }
+        instants, _ = thinned(time_s, np.zeros((0, len(time_s))))
+        store.put("vbus", "grid", instants, [found_rows[bus] for bus in buses])
 
 
 def _frequency(
@@ -65,14 +76,16 @@ def _frequency(
     return None
 
 
-def _links(run: Run, found: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _links(store: Store, found: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the links, with the row of each direction in the tables of the traffic."""
-    series = run.table("link_series", "from", "to")
-    rows = {pair: i for i, pair in enumerate(directions(series))} if len(series) else {}
+    rows = {name: i for i, name in enumerate(store.elements.get("load", ()))}
     return [
         link
         | {
-            "ways": [rows.get((link["a"], link["b"])), rows.get((link["b"], link["a"]))],
+            "ways": [
+                rows.get(direction(link["a"], link["b"])),
+                rows.get(direction(link["b"], link["a"])),
+            ],
             "outages": [[o["t_s"], o["is_down"]] for o in found["outages"] if o["link"] == number],
         }
         for number, link in enumerate(found["links"])

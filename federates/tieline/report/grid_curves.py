@@ -1,11 +1,11 @@
 """Prepares the grid's curves of one run: speeds, voltages, averages, stabilisers, ages."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-import pandas as pd
 
 from tieline.experiment.results import Run
+from tieline.report.packing import thinned
 from tieline.report.store import Chart, Curve, Floats, Store, areas_of, columns_of, rows_of
 
 COI = "centre of inertia"
@@ -35,7 +35,7 @@ def put_grid(store: Store, run: Run) -> None:
     _chart(store, "speed", "Rotor speeds", "frequency, Hz", put.curves, (reference,), hidden)
     _chart(store, "pmu", "Frequency at the PMUs", "frequency, Hz", put.curves, (reference,))
     _chart(store, "vt", "Terminal voltages", "voltage, pu", put.curves, note=hidden)
-    _belief(store, put, time_s, coi_hz, reference, nominal_hz)
+    _belief(store, put, coi_hz, reference, nominal_hz)
     _chart(store, "vs", "Stabiliser outputs", "output, pu", put.curves, note=hidden)
     _chart(
         store, "age", "Age of the PMU data that each controller acts on", "age, ms", put.curves,
@@ -56,36 +56,43 @@ class _Putter:
         tripped: set[str],
     ) -> None:
         self.curves: dict[str, list[Curve]] = {}
-        self.wbar: Floats | None = None
         self._store, self._run, self._time_s = store, run, time_s
         self._areas = {**unit_areas, **bus_areas}
         self._tripped = tripped
 
     def units(self, name: str, quantity: str, factor: float = 1.0) -> None:
         """Add a quantity of every unit that has a value of it at any time."""
-        elements, rows = self._read(quantity)
-        self._put(name, elements, factor * rows, is_unit=True)
+        self._put(name, *self.read(quantity, lambda rows: factor * rows), is_unit=True)
 
     def buses(self, name: str, quantity: str) -> None:
         """Add a quantity of every bus that has it."""
-        elements, rows = self._read(quantity)
-        self._put(name, elements, rows, is_unit=False)
+        self._put(name, *self.read(quantity, lambda rows: rows), is_unit=False)
 
-    def _read(self, quantity: str) -> tuple[list[str], Floats]:
-        """Return the elements that have a quantity, and its values; the others stay on disk."""
+    def read(
+        self, quantity: str, made_of: Callable[[Floats], Floats]
+    ) -> tuple[list[str], Floats, Floats]:
+        """Return the elements that have a value of a quantity, and what is made of it, thinned.
+
+        Returns (elements (n,), instants (m,), values (n, m)); at no time all of a long run's.
+        """
         names = [name for name in self._run.columns("grid") if name.startswith(f"{quantity}.")]
-        table = self._run.table("grid", *names) if names else pd.DataFrame()
-        elements = columns_of(table, quantity)
-        return elements, rows_of(table, quantity, elements)
+        elements: list[str] = []
+        kept: list[Floats] = []
+        for table in self._run.blocks("grid", names):
+            block = columns_of(table, quantity)
+            rows = rows_of(table, quantity, block)
+            with_value = np.flatnonzero(~np.isnan(rows).all(axis=1))
+            elements += [block[i] for i in with_value]
+            kept.append(thinned(self._time_s, made_of(rows[with_value]))[1])
+        instants, _ = thinned(self._time_s, np.zeros((0, len(self._time_s))))
+        return elements, instants, np.concatenate([np.zeros((0, len(instants))), *kept])
 
-    def _put(self, name: str, elements: Sequence[str], rows: Floats, is_unit: bool) -> None:
-        kept = [i for i, row in enumerate(rows) if not np.isnan(row).all()]
-        if not kept:
+    def _put(
+        self, name: str, names: Sequence[str], instants: Floats, rows: Floats, *, is_unit: bool
+    ) -> None:
+        if not names:
             return
-        names = [elements[i] for i in kept]
-        self._store.put(name, "grid", self._time_s, rows[kept], names)
-        if name == "wbar":
-            self.wbar = rows[kept]
+        self._store.put(name, "grid", instants, rows, names)
         self.curves[name] = [
             Curve(
                 element if is_unit else f"bus {element[1:]}",
@@ -122,18 +129,17 @@ def _chart(
 def _belief(
     store: Store,
     put: _Putter,
-    time_s: Floats,
     coi_hz: Floats,
     reference: Curve,
     nominal_hz: float,
 ) -> None:
     """Add what each controller takes the average for, and by how much it is wrong."""
-    if put.wbar is None:
-        return
-    curves = [c for c in put.curves["wbar"] if not (put.wbar[c.row] == nominal_hz).all()]
+    _, _, moved = put.read("wbar_pu", lambda rows: rows != 1.0)
+    curves = [c for c in put.curves.get("wbar", ()) if moved[c.row].any()]
     if not curves:
         return
-    store.put("error", "grid", time_s, 1e3 * (put.wbar - coi_hz))
+    _, instants, rows = put.read("wbar_pu", lambda rows: 1e3 * (nominal_hz * rows - coi_hz))
+    store.put("error", "grid", instants, rows)
     errors = [Curve(c.label, "error", c.row, c.group, c.unit, c.style) for c in curves]
     store.charts.append(
         Chart("wbar", "Average that each controller believes", "frequency, Hz",

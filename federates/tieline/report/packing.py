@@ -12,6 +12,8 @@ Floats = NDArray[np.float64]
 MISSING = 65535
 """The code of a value that is not there."""
 
+_VALUES_AT_ONCE = 300_000
+
 MOST_INSTANTS = 6000
 """Of a curve in a page; above, two stand for each interval."""
 
@@ -34,6 +36,17 @@ def thinned(time_s: Floats, rows: Floats, most: int = MOST_INSTANTS) -> tuple[Fl
     length = -(-count // (most // 2))
     starts = np.arange(0, count, length)
     last = np.minimum(starts + length, count) - 1
+    instants = np.stack([time_s[starts], time_s[last]], axis=1).ravel()
+    # A few rows at a time: what it takes beside them is several times their size.
+    at_once = max(1, _VALUES_AT_ONCE // count)
+    blocks = [_extremes(rows[i : i + at_once], length) for i in range(0, len(rows), at_once)]
+    return instants, np.concatenate([np.zeros((0, len(instants))), *blocks])
+
+
+def _extremes(rows: Floats, length: int) -> Floats:
+    """Return the least and the greatest value of each so many, as they follow each other."""
+    count = rows.shape[1]
+    starts = np.arange(0, count, length)
     padded = np.full((len(rows), len(starts) * length), np.nan)
     padded[:, :count] = rows
     parts = padded.reshape(len(rows), len(starts), length)
@@ -46,8 +59,7 @@ def thinned(time_s: Floats, rows: Floats, most: int = MOST_INSTANTS) -> tuple[Fl
     kept[..., 0] = np.take_along_axis(parts, first, axis=2)[..., 0]
     kept[..., 1] = np.take_along_axis(parts, second, axis=2)[..., 0]
     kept[empty] = np.nan
-    instants = np.stack([time_s[starts], time_s[last]], axis=1).ravel()
-    return instants, kept.reshape(len(rows), -1)
+    return kept.reshape(len(rows), 2 * len(starts))
 
 
 def packed(rows: Floats) -> dict[str, Any]:
