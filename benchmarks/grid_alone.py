@@ -1,14 +1,16 @@
 """The grid alone on one core: 40 s of the trip of G26, against a fine step, its floor and peers.
 
 The first run on a machine compiles, which is not counted. With `--andes PYTHON`, an interpreter
-that has `andes` installed, ANDES's WECC case is simulated in the same run.
+that has `andes` installed, ANDES's WECC case is simulated in the same run; with `--dpsim PYTHON`
+the miniWECC, as far as DPsim has parts for it.
 """
 
-from grid_runs import Ran, g26_grid, g26_system, simulate, speeds  # isort: skip
+from grid_runs import TRIPPED, Ran, g26_grid, g26_system, simulate, speeds  # isort: skip
 
 import argparse
 import json
 import subprocess
+import tempfile
 import time
 from pathlib import Path
 from statistics import median
@@ -16,6 +18,7 @@ from statistics import median
 import numba
 import numpy as np
 from figures import Row, save
+from like_case import like_case
 
 from tieline.grid.equations import rhs
 from tieline.grid.system import System
@@ -164,11 +167,21 @@ def beside(name: str, command: list[str | Path], own_s: list[float], reach: floa
     ]  # fmt: skip
 
 
+def beside_dpsim(python: str, own_s: list[float]) -> list[Row]:
+    """Return DPsim's simulated seconds a CPU second on a like case, and tieline's over them."""
+    script = Path(__file__).parent / "peers" / "dpsim_trip.py"
+    with tempfile.TemporaryDirectory() as folder:
+        case = Path(folder) / "case.json"
+        case.write_text(json.dumps(like_case(TRIPPED)))
+        return beside("DPsim", [python, script, case], own_s, 3.0)
+
+
 def main() -> None:
     """Run every measurement and print it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--times", type=int, default=9, help="repetitions")
     parser.add_argument("--andes", metavar="PYTHON", help="an interpreter that has andes")
+    parser.add_argument("--dpsim", metavar="PYTHON", help="an interpreter that has dpsim")
     parser.add_argument("--json", type=Path, help="file for the figures")
     options = parser.parse_args()
     system = g26_system()
@@ -178,6 +191,8 @@ def main() -> None:
     if options.andes:
         script = Path(__file__).parent / "peers" / "andes_simulation.py"
         rows += beside("ANDES", [options.andes, script], own_s, 40.0)
+    if options.dpsim:
+        rows += beside_dpsim(options.dpsim, own_s)
     save(rows, options.json)
 
 

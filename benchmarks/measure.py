@@ -49,7 +49,7 @@ class Benchmark:
 
 
 BENCHMARKS = (
-    Benchmark("grid_alone", "The grid alone", ("andes",)),
+    Benchmark("grid_alone", "The grid alone", ("andes", "dpsim")),
     Benchmark("grid_growth", "Larger grids"),
     Benchmark("packet_engine", "The packet engine", ("ns3",)),
     Benchmark("network_growth", "Larger networks"),
