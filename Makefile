@@ -26,7 +26,7 @@ demo: $(VENV)/runtime
 	$(BIN)/tieline run g26_trip --core zmq
 
 test: $(VENV)/development
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 smoke: $(VENV)/development
 	$(BIN)/python -m pytest -m smoke
