@@ -7,12 +7,11 @@ whole command. Points are of 4 s, each with a delay of its own.
 """
 
 import argparse
-import json
 import os
-import statistics
 import tempfile
 from pathlib import Path
 
+from figures import Row, save
 from startup import Sample, once
 
 SETTINGS = ("grid.duration=4 s", "grid.events=[{at: 1 s, trip_generator: G26}]")
@@ -26,19 +25,16 @@ def command(points: int, jobs: int) -> tuple[str, ...]:
     return ("sweep", "g26_trip_smoke", "--jobs", str(jobs), "--quiet", *settings)
 
 
-def row(figure: str, unit: str, values: list[float], reach: str, points: int) -> dict:
-    """Return one row of the table of figures."""
-    return {
-        "what": f"sweep of {points} G26 runs of 4 s",
-        "figure": figure,
-        "unit": unit,
-        "reach": reach,
-        "median": round(statistics.median(values), 3),
-        "low": round(min(values), 3),
-        "high": round(max(values), 3),
-        "command": f"python benchmarks/sweep.py --points {points}",
-        "peers": "",
-    }
+def rows_of(points: int, taken: dict[int, list[Sample]]) -> list[Row]:
+    """Return the ratio of the wall times, and wall and processor time of either number of jobs."""
+    what = f"sweep of {points} G26 runs of 4 s"
+    ratios = [one[0] / two[0] for one, two in zip(taken[1], taken[2], strict=True)]
+    rows = [Row(what, "wall time of one core over that of two", "", ratios, "at least", 1.8)]
+    for jobs, samples in taken.items():
+        walls, cpus = zip(*samples, strict=True)
+        rows.append(Row(what, f"wall time, {jobs} at once", "s", walls))
+        rows.append(Row(what, f"CPU time, {jobs} at once", "s", cpus))
+    return rows
 
 
 def main() -> None:
@@ -56,16 +52,7 @@ def main() -> None:
             for jobs, samples in taken.items():
                 out = f"{folder}/{number}-{jobs}"
                 samples.append(once((*command(options.points, jobs), "--out", out), os.environ))
-    ratios = [one[0] / two[0] for one, two in zip(taken[1], taken[2], strict=True)]
-    found = [row("wall time of one core by that of two", "1", ratios, "1.8", options.points)]
-    for jobs, samples in taken.items():
-        walls, cpus = ([sample[i] for sample in samples] for i in (0, 1))
-        found.append(row(f"wall time, {jobs} at once", "s", walls, "", options.points))
-        found.append(row(f"processor time, {jobs} at once", "s", cpus, "", options.points))
-    for line in found:
-        print(f"{line['figure']:40} {line['median']:8.2f} {line['unit']}")
-    if options.json is not None:
-        options.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    save(rows_of(options.points, taken), options.json)
 
 
 if __name__ == "__main__":
