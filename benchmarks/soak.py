@@ -209,7 +209,7 @@ def main() -> None:
     is_equal = all(found == hashes[0] for found in hashes)
     if asked.json:
         print(json.dumps({"is_equal": is_equal, "tables": hashes[0], "runs": answers}, indent=2))
-    else:
+    elif len(hashes) > 1:
         same = "equal" if is_equal else "DIFFERENT"
         print(f"{len(hashes[0])} tables of {len(hashes)} runs: {same}")
     if not is_equal or not all(answer["is_flat"] for answer in answers):

@@ -73,26 +73,26 @@ def packed(rows: Floats) -> dict[str, Any]:
         rows: (n, m) curves; NaN where there is no value.
     """
     rows = np.asarray(rows, np.float64)
-    empty = np.isnan(rows).all(axis=1)
-    low, span = np.zeros(len(rows)), np.zeros(len(rows))
-    if not empty.all():
-        low[~empty] = np.nanmin(rows[~empty], axis=1)
-        span[~empty] = np.nanmax(rows[~empty], axis=1) - low[~empty]
-    is_whole = np.array([_is_whole(row) for row in rows], bool) & (span < MISSING)
-    step = np.where(is_whole | (span == 0), 1.0, span / (MISSING - 1))
-    codes = np.where(np.isnan(rows), MISSING, (rows - low[:, None]) / step[:, None])
-    whole = np.round(codes).astype(np.uint16)
-    steps = np.diff(whole, axis=1, prepend=np.zeros((len(rows), 1), np.uint16)).astype("<u2")
-    planes = np.ascontiguousarray(steps).view(np.uint8).reshape(-1, 2).T
+    steps = np.zeros(rows.shape, "<u2")
+    # Row by row: all of them would take several times their size at once.
+    scales = [_steps(row, into) for row, into in zip(rows, steps, strict=True)]
+    planes = steps.view(np.uint8).reshape(-1, 2).T
     return {
         "rows": rows.shape[0],
         "length": rows.shape[1],
-        "low": low.tolist(),
-        "step": step.tolist(),
+        "low": [low for low, _ in scales],
+        "step": [step for _, step in scales],
         "data": base64.b64encode(zlib.compress(planes.tobytes(), 6)).decode(),
     }
 
 
-def _is_whole(row: Floats) -> bool:
+def _steps(row: Floats, into: NDArray[np.uint16]) -> tuple[float, float]:
+    """Write the differences of a curve's codes; return the value of code 0, and that of a step."""
     values = row[~np.isnan(row)]
-    return bool(np.all(values == np.round(values)))
+    low = float(values.min()) if values.size else 0.0
+    span = float(values.max()) - low if values.size else 0.0
+    is_whole = bool(np.all(values == np.round(values))) and span < MISSING
+    step = 1.0 if is_whole or span == 0.0 else span / (MISSING - 1)
+    codes = np.where(np.isnan(row), MISSING, np.round((row - low) / step)).astype(np.uint16)
+    into[:] = np.diff(codes, prepend=np.zeros(1, np.uint16))
+    return low, step
