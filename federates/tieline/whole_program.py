@@ -45,10 +45,14 @@ class Translation(JITCodeLibrary):
         self._linking_libraries.append(library)
 
     def add_llvm_module(self, ll_module: Any) -> None:
-        """Add functions as they are."""
+        """Add functions, each simplified by itself: it is then shorter wherever it is taken in."""
         self._raise_if_finalized()
         ll_module.data_layout = self._codegen._data_layout
-        self._names |= {each.name for each in ll_module.functions if not each.is_declaration}
+        passes, builder = self._codegen._function_pass_manager()
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
+                self._names.add(function.name)
         self._final_module.link_in(ll_module)
 
     def get_pointer_to_function(self, name: str) -> int:
