@@ -12,13 +12,16 @@ from contextlib import contextmanager
 from typing import Any
 
 from llvmlite.binding import Linkage
+from numba.core import dispatcher
 from numba.core.ccallback import CFunc
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompilerBase, CompileResult
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.dispatcher import _FunctionCompiler
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.sigutils import normalize_signature
+
+FunctionCompiler: Any = dispatcher._FunctionCompiler  # type: ignore[attr-defined]
+NumbaCallback: Any = CFunc
 
 WITHOUT_WRAPPERS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
@@ -32,6 +35,7 @@ class Translation(JITCodeLibrary):
     def __init__(self, codegen: Any, name: str) -> None:
         super().__init__(codegen, name)
         self._names: set[str] = set()
+        self._shareable: Any = None
 
     @property
     def codegen(self) -> Any:
@@ -66,13 +70,13 @@ class Translation(JITCodeLibrary):
         """Return the functions as they are, for one of them to stay where many users bring them."""
         if self._finalized:
             return super()._get_module_for_linking()
-        if self._shared_module is None:
-            self._shared_module = self._final_module.clone()
+        if self._shareable is None:
+            self._shareable = self._final_module.clone()
             for name in self._names:
-                function = self._shared_module.get_function(name)
+                function = self._shareable.get_function(name)
                 if function.linkage == Linkage.external:
                     function.linkage = Linkage.linkonce_odr
-        return self._shared_module
+        return self._shareable
 
     def finalize(self) -> None:
         """Take in all that is used, directly or not, and make machine code of it."""
@@ -80,7 +84,7 @@ class Translation(JITCodeLibrary):
         assert used[0] is self
         self._linking_libraries = used[1:]
         super().finalize()
-        self._shared_module = None
+        self._shareable = None
 
 
 class _Nowhere:
@@ -141,7 +145,7 @@ class Kernel(CPUDispatcher):
         super().__init__(py_func, locals or {}, options, pipeline_class)
         inner = {**options, **WITHOUT_WRAPPERS}
         self._inner = CPUDispatcher(py_func, locals or {}, inner, pipeline_class)
-        self._compiler = _Whole(self._inner, self._compiler)
+        self._compiler: Any = _Whole(self._inner, self._compiler)
 
     @property
     def is_compiling(self) -> Any:
@@ -158,10 +162,10 @@ class Kernel(CPUDispatcher):
         return self._inner.get_overload(sig)
 
 
-class _Whole(_FunctionCompiler):
+class _Whole(FunctionCompiler):
     """Makes machine code of a translation, to be called from Python."""
 
-    def __init__(self, inner: CPUDispatcher, numbas: _FunctionCompiler) -> None:
+    def __init__(self, inner: CPUDispatcher, numbas: Any) -> None:
         self.__dict__.update(numbas.__dict__)
         self._inner = inner
 
@@ -188,7 +192,7 @@ class _Whole(_FunctionCompiler):
         return whole
 
 
-class Callback(CFunc):
+class Callback(NumbaCallback):
     """A compiled function that C, or compiled code that does not know it, calls by its address."""
 
     def __init__(self, function: Callable[..., Any], signature: Any, options: Any) -> None:
@@ -196,4 +200,5 @@ class Callback(CFunc):
 
     def _compile_uncached(self) -> CompileResult:
         with _translating():
-            return super()._compile_uncached()
+            result: CompileResult = super()._compile_uncached()
+        return result

@@ -7,6 +7,7 @@ Every argument is an array (n,), one element a unit. Source of the blocks' limit
 from collections.abc import Iterable, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tieline.compiled import compiled
 from tieline.grid.models.base import Array
@@ -43,7 +44,7 @@ def lag(u: Array, x: Array, T: Array) -> tuple[Array, Array]:
 
 
 @compiled
-def zero_where(condition: Array, rate: Array) -> Array:
+def zero_where(condition: NDArray[np.bool_], rate: Array) -> Array:
     """Return `rate`, and 0 where the condition holds: a state that stays at its limit."""
     # Loops, here and below, because np.where costs the compiler seconds for each model.
     free = rate.copy()
