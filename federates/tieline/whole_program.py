@@ -1,4 +1,4 @@
-"""Compiles a function together with all that it calls: optimised once, and for one processor once.
+"""Compiles a function together with all that it calls, so that each is optimised once.
 
 numba makes machine code of every function for itself and gives it two wrappers, one for Python and
 one for C; whoever calls it then takes it in, with all that it calls, to optimise it again. What
@@ -20,6 +20,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.sigutils import normalize_signature
 
+# numba has no type hints for these two.
 FunctionCompiler: Any = dispatcher._FunctionCompiler  # type: ignore[attr-defined]
 NumbaCallback: Any = CFunc
 

@@ -50,7 +50,7 @@ def filter_angles(sensors: Sensors, v: NDArray[np.complex128], x: Floats, dx: Fl
         phasor = v[sensors.bus[k]]
         gap = np.arctan2(phasor.imag, phasor.real) - x[z1]
         gap = gap - 2.0 * np.pi * np.floor(gap / (2.0 * np.pi) + 0.5)
-        if np.abs(phasor.real) + np.abs(phasor.imag) <= DEAD_PU:
+        if not np.abs(phasor.real) + np.abs(phasor.imag) > DEAD_PU:
             # A dead bus has no angle: its estimate runs down to the nominal frequency.
             gap = 0.0
         dx[z1] = x[z2]
