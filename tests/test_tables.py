@@ -1,6 +1,8 @@
 """Result tables: what is written is read back, and what a killed process wrote stays readable."""
 
 import errno
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -274,3 +276,22 @@ def test_a_table_takes_nothing_after_a_batch_that_found_no_room(
     stream.close()
     [path] = salvage(tmp_path)
     assert len(read_table(path)) == 10
+
+
+def test_a_table_is_written_without_pandas(tmp_path: Path) -> None:
+    """Each federate would wait for that import before its first result is on disk."""
+    script = """if True:
+        import sys
+        from pathlib import Path
+        import numpy as np
+        from tieline.tables import Column, write_table
+        columns = [Column("a", "", "text", "str"), Column("b", "", "flag", "bool")]
+        rows = {"a": np.array(["x", None, "\\u00e9"], object), "b": np.array([True, False, True])}
+        write_table(Path(sys.argv[1]), columns, rows)
+        assert "pandas" not in sys.modules
+    """
+    path = tmp_path / "table.parquet"
+    subprocess.run([sys.executable, "-c", script, str(path)], check=True)
+    table = pq.read_table(path)
+    assert table["a"].to_pylist() == ["x", None, "\u00e9"]
+    assert table["b"].to_pylist() == [True, False, True]

@@ -12,14 +12,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba.core.ccallback import CFunc
 from numba.core.compiler import Compiler, CompilerBase
 from numba.core.errors import NumbaExperimentalFeatureWarning
-from numba.core.sigutils import normalize_signature
 from numba.typed import List
 
 from tieline import kernels
 from tieline.indices import IndicesFromZero
+from tieline.whole_program import Callback, Kernel
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -49,7 +48,7 @@ def compiled_from_zero(function: Function) -> Function:
 
 def _kept(function: Function, pipeline: type[CompilerBase]) -> Function:
     options = {"nogil": True, "error_model": "numpy"}
-    result: Any = numba.njit(**options, pipeline_class=pipeline)(function)
+    result: Any = Kernel(function, {}, {"nopython": True, "boundscheck": None, **options}, pipeline)
     result._cache = kernels.Kernels(function, f"{pipeline.__name__} {options}")
     kept: Function = result
     return kept
@@ -95,7 +94,7 @@ def _append(functions: Any, function: Any) -> None:
 @cache
 def _first_class(function: Callable[..., None], signature: Any) -> Any:
     options = {"error_model": "numpy"}
-    result: Any = CFunc(function, normalize_signature(signature), locals={}, options=options)
+    result: Any = Callback(function, signature, options)
     result._cache = kernels.Kernels(function, f"callback {options}")
     result.compile()
     return result

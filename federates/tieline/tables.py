@@ -18,6 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import ArrayLike, NDArray
 
+from tieline.arrow_arrays import array
 from tieline.errors import CosimError, NumericalError
 
 if TYPE_CHECKING:
@@ -285,25 +286,8 @@ def _batch(
             row = int(np.argmax(np.isinf(values)))
             when = f" at t = {arrays['t_s'][row]} s" if "t_s" in arrays else f" in row {row}"
             raise NumericalError(f"{path.name}: {name} is not finite ({values[row]}){when}")
-    columns = [_array(field.type, arrays[field.name]) for field in schema]
+    columns = [array(field.type, arrays[field.name]) for field in schema]
     return pa.RecordBatch.from_arrays(columns, schema=schema)
-
-
-def _array(kind: pa.DataType, values: NDArray[np.generic]) -> pa.Array:
-    """Return values as Arrow has them, NaN as null.
-
-    `pa.array` would do as much for an array, but imports pandas for it.
-    """
-    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
-        return pa.array(values.tolist(), kind, from_pandas=True)
-    data = np.ascontiguousarray(values, kind.to_pandas_dtype())
-    valid, nulls = None, 0
-    if pa.types.is_floating(kind):
-        is_missing = np.isnan(data)
-        nulls = int(is_missing.sum())
-        if nulls:
-            valid = pa.py_buffer(np.packbits(~is_missing, bitorder="little"))
-    return pa.Array.from_buffers(kind, len(data), [valid, pa.py_buffer(data)], nulls)
 
 
 def _common_length(

@@ -173,8 +173,9 @@ def _judge(
     has_right_crc: NDArray[np.bool_],
 ) -> NDArray[np.uint8]:
     """Return the `Verdict` on each frame from its words, all (n,)."""
-    verdicts = np.full(len(sync), _SOUND, np.uint8)
+    verdicts = np.empty(len(sync), np.uint8)
     for i in range(len(sync)):
+        verdicts[i] = _SOUND
         if size[i] != FRAME_BYTES:
             verdicts[i] = _SIZE
         elif sync[i] != _SYNC_2005 and sync[i] != _SYNC_2011:

@@ -45,15 +45,16 @@ class Sensors(NamedTuple):
 def filter_angles(sensors: Sensors, v: NDArray[np.complex128], x: Floats, dx: Floats) -> None:
     """Write the derivatives of the filters' states (2, m) from the bus voltages."""
     count = len(sensors.bus)
-    z1 = x[sensors.x0 : sensors.x0 + count]
-    z2 = x[sensors.x0 + count : sensors.x0 + 2 * count]
-    phasor = v[sensors.bus]
-    gap = np.arctan2(phasor.imag, phasor.real) - z1
-    gap = gap - 2.0 * np.pi * np.floor(gap / (2.0 * np.pi) + 0.5)
-    # A dead bus has no angle: its estimate runs down to the nominal frequency.
-    gap = np.where(np.abs(phasor.real) + np.abs(phasor.imag) > DEAD_PU, gap, 0.0)
-    dx[sensors.x0 : sensors.x0 + count] = z2
-    dx[sensors.x0 + count : sensors.x0 + 2 * count] = B * gap - A1 * z2
+    for k in range(count):
+        z1, z2 = sensors.x0 + k, sensors.x0 + count + k
+        phasor = v[sensors.bus[k]]
+        gap = np.arctan2(phasor.imag, phasor.real) - x[z1]
+        gap = gap - 2.0 * np.pi * np.floor(gap / (2.0 * np.pi) + 0.5)
+        if not np.abs(phasor.real) + np.abs(phasor.imag) > DEAD_PU:
+            # A dead bus has no angle: its estimate runs down to the nominal frequency.
+            gap = 0.0
+        dx[z1] = x[z2]
+        dx[z2] = B * gap - A1 * x[z2]
 
 
 @compiled

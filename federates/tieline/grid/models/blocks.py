@@ -7,6 +7,7 @@ Every argument is an array (n,), one element a unit. Source of the blocks' limit
 from collections.abc import Iterable, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tieline.compiled import compiled
 from tieline.grid.models.base import Array
@@ -43,6 +44,17 @@ def lag(u: Array, x: Array, T: Array) -> tuple[Array, Array]:
 
 
 @compiled
+def zero_where(condition: NDArray[np.bool_], rate: Array) -> Array:
+    """Return `rate`, and 0 where the condition holds: a state that stays at its limit."""
+    # Loops, here and below, because np.where costs the compiler seconds for each model.
+    free = rate.copy()
+    for i in range(len(free)):
+        if condition[i]:
+            free[i] = 0.0
+    return free
+
+
+@compiled
 def lag_non_windup(
     u: Array, x: Array, K: Array, T: Array, low: Array, high: Array
 ) -> tuple[Array, Array]:
@@ -53,7 +65,7 @@ def lag_non_windup(
     y = np.minimum(np.maximum(x, low), high)
     rate = (K * u - y) / T
     stuck = ((x >= high) & (rate > 0)) | ((x <= low) & (rate < 0))
-    return y, np.where(stuck, 0.0, rate)
+    return y, zero_where(stuck, rate)
 
 
 @compiled
@@ -65,7 +77,6 @@ def clamp(u: Array, low: Array, high: Array) -> Array:
 @compiled
 def rate_or_zero(gap: Array, T: Array) -> Array:
     """Return gap / T, and 0 where T is 0: the state of a block that is bypassed stays put."""
-    # Loops, because np.where costs the compiler seconds for each model.
     rate = np.zeros_like(gap)
     for i in range(len(gap)):
         if T[i] > 0.0:
@@ -155,7 +166,7 @@ def limited_lag(
     A state that a moving limit has left behind follows it with T instead of waiting beyond it.
     Where T = 0 the output is K u within the limits.
     """
-    y = np.minimum(np.maximum(np.where(T > 0.0, x, K * u), low), high)
+    y = np.minimum(np.maximum(where_positive(T, x, K * u), low), high)
     stuck = ((x >= high) & (K * u > y)) | ((x <= low) & (K * u < y))
     return y, rate_or_zero(np.where(stuck, y, K * u) - x, T)
 
@@ -165,7 +176,7 @@ def limited_integrator(rate: Array, x: Array, low: Array, high: Array) -> tuple[
     """Return output and derivative of an integrator with non-windup limits (Annex E.2)."""
     y = np.minimum(np.maximum(x, low), high)
     stuck = ((x >= high) & (rate > 0.0)) | ((x <= low) & (rate < 0.0))
-    return y, np.where(stuck, 0.0, rate)
+    return y, zero_where(stuck, rate)
 
 
 @compiled
