@@ -1,6 +1,8 @@
 """Result tables: what is written is read back, and what a killed process wrote stays readable."""
 
 import errno
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -274,3 +276,14 @@ def test_a_table_takes_nothing_after_a_batch_that_found_no_room(
     stream.close()
     [path] = salvage(tmp_path)
     assert len(read_table(path)) == 10
+
+
+def test_writing_text_waits_for_no_pandas(tmp_path: Path) -> None:
+    """A federate would otherwise import pandas at its end, half a second for nothing."""
+    program = (
+        "import sys; from pathlib import Path; from tieline.tables import Column, write_table;"
+        f"write_table(Path({str(tmp_path / 'a.parquet')!r}), [Column('u', '', 'unit', 'str')],"
+        " {'u': ['G1', None]}); assert 'pandas' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
+    assert read_table(tmp_path / "a.parquet")["u"].isna().tolist() == [False, True]

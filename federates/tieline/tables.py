@@ -18,7 +18,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import ArrayLike, NDArray
 
-from tieline.errors import CosimError, NumericalError
+from tieline.batches import batch_of
+from tieline.errors import CosimError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -133,7 +134,7 @@ class TableStream:
         arrays = {name: buffer[: self._filled] for name, buffer in self._buffers.items()}
         # Whatever comes of it, these rows are done with: a table is also closed after a failure.
         self._filled = 0
-        batch = _batch(self.path, self._schema, arrays)
+        batch = batch_of(self.path.name, self._schema, arrays)
         whole_bytes = self._sink.tell()
         try:
             self._writer.write_batch(batch)
@@ -215,7 +216,7 @@ def write_table(path: Path, columns: Sequence[Column], data: Mapping[str, ArrayL
     extra = {name: np.asarray(values) for name, values in data.items() if name not in arrays}
     _common_length(path, dict.fromkeys(schema.names), {**arrays, **extra})
     part = _part_of(path)
-    batch = _batch(path, schema, arrays)
+    batch = batch_of(path.name, schema, arrays)
     try:
         pq.write_table(pa.Table.from_batches([batch]), part, compression="zstd")
         part.replace(path)
@@ -275,35 +276,6 @@ def _numpy_type(dtype: str) -> "np.dtype[np.generic]":
 
 def _arrow_type(dtype: str) -> pa.DataType:
     return pa.string() if dtype == "str" else pa.from_numpy_dtype(np.dtype(dtype))
-
-
-def _batch(
-    path: Path, schema: pa.Schema, arrays: Mapping[str, NDArray[np.generic]]
-) -> pa.RecordBatch:
-    for name, values in arrays.items():
-        if values.dtype.kind == "f" and np.isinf(values).any():
-            row = int(np.argmax(np.isinf(values)))
-            when = f" at t = {arrays['t_s'][row]} s" if "t_s" in arrays else f" in row {row}"
-            raise NumericalError(f"{path.name}: {name} is not finite ({values[row]}){when}")
-    columns = [_array(field.type, arrays[field.name]) for field in schema]
-    return pa.RecordBatch.from_arrays(columns, schema=schema)
-
-
-def _array(kind: pa.DataType, values: NDArray[np.generic]) -> pa.Array:
-    """Return values as Arrow has them, NaN as null.
-
-    `pa.array` would do as much for an array, but imports pandas for it.
-    """
-    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
-        return pa.array(values.tolist(), kind, from_pandas=True)
-    data = np.ascontiguousarray(values, kind.to_pandas_dtype())
-    valid, nulls = None, 0
-    if pa.types.is_floating(kind):
-        is_missing = np.isnan(data)
-        nulls = int(is_missing.sum())
-        if nulls:
-            valid = pa.py_buffer(np.packbits(~is_missing, bitorder="little"))
-    return pa.Array.from_buffers(kind, len(data), [valid, pa.py_buffer(data)], nulls)
 
 
 def _common_length(
