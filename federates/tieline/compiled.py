@@ -15,6 +15,7 @@ import numba
 from numba.core.ccallback import CFunc
 from numba.core.compiler import Compiler, CompilerBase
 from numba.core.errors import NumbaExperimentalFeatureWarning
+from numba.core.registry import cpu_target
 from numba.core.sigutils import normalize_signature
 from numba.typed import List
 
@@ -32,6 +33,12 @@ IS_ON = os.environ.get("TIELINE_COMPILER", "on") != "off"
 def cached() -> tuple[Path | None, int]:
     """Return the folder that takes compiled functions (None: there is none) and how many exist."""
     return kernels.folder(), kernels.count()
+
+
+def load_compiler() -> None:
+    """Import what the first compiled function of a process imports, half a second for each fork."""
+    if IS_ON:
+        cpu_target.typing_context.refresh()
 
 
 def compiled(function: Function) -> Function:

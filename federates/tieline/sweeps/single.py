@@ -35,7 +35,12 @@ def launch_here(folder: Path, on_progress: Callable[[Progress], None]) -> Outcom
 
     for module in (*FEDERATES, *WITH_HELICS):
         importlib.import_module(module)
-    start = forked if _can_fork() else executed
+    start = executed
+    if _can_fork():
+        from tieline.compiled import load_compiler
+
+        load_compiler()
+        start = forked
     with warnings.catch_warnings():
         # Python counts Arrow's thread.
         warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
