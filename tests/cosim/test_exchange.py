@@ -195,7 +195,7 @@ T4_NS = 66_666_666
 T5_NS = 83_333_333
 
 
-def test_with_a_lead_the_federates_meet_once_a_stride_with_one_message_for_the_next_meeting() -> None:
+def test_with_a_lead_the_federates_meet_once_a_stride_with_one_message() -> None:
     """If not, one federate would have to wait for the other at every turn."""
     arrivals = {
         1_000: [(0, bundle(0)), (0, bundle(1))],

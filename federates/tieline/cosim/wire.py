@@ -13,7 +13,7 @@ PART_LIMIT_BYTES = {"tcp": 3_800}
 """Longest message of a core, header included; HELICS 3.6.1 loses longer ones on tcp silently."""
 
 TOGETHER_BYTES = 500_000
-"""Longest message made of several bundles; a bundle of its own may be longer, where the core can."""
+"""Longest message made of several bundles; one bundle may be longer, where the core can."""
 
 _PART = struct.Struct("<4sBIHHI")
 _MAGIC = b"TLM1"
@@ -72,7 +72,7 @@ def read_parts(data: bytes) -> list[Part]:
     Raises:
         CosimError: it is no message of tieline.
     """
-    parts = []
+    parts: list[Part] = []
     at = 0
     while at < len(data) or not parts:
         if len(data) - at < _PART.size or data[at : at + len(_MAGIC)] != _MAGIC:

@@ -14,6 +14,8 @@ from tieline.units import NS_PER_S
 _NEVER = np.iinfo(np.int64).min
 _UNKNOWN = -1
 _IDCODES = 1 << 16
+_TAG_ROUNDING_NS = 500
+"""Time tags are whole microseconds, rounded."""
 
 
 class Fate(IntEnum):
@@ -55,6 +57,18 @@ class Readings:
     sensors: NDArray[np.int32]
     tags_ns: NDArray[np.int64]
     f_hz: NDArray[np.float64]
+
+    def first_early(
+        self, payload_row: NDArray[np.int64], arrivals_ns: NDArray[np.int64]
+    ) -> int | None:
+        """Return the first delivery (of r) whose sound frame says that it was measured later.
+
+        Args:
+            payload_row: (r,) which frame each brings.
+            arrivals_ns: (r,) when it came.
+        """
+        place = int(_first_early(payload_row, arrivals_ns, self.fates, self.tags_ns))
+        return None if place < 0 else place
 
 
 def checked_weights(weights: ArrayLike | None, n_sensors: int) -> NDArray[np.float64]:
@@ -177,8 +191,8 @@ class WideAreaAverage:
         is_last[:-1] = moments[1:] != moments[:-1]
         wbar = np.empty((int(is_last.sum()), len(self._counts)))
         bad = _keep_newest(
-            destination.astype(np.int64),
-            payload_row.astype(np.int64),
+            destination.astype(np.int64, copy=False),
+            payload_row.astype(np.int64, copy=False),
             is_last,
             readings.fates,
             readings.sensors,
@@ -231,6 +245,21 @@ class WideAreaAverage:
     def _ages_ns(self, now_ns: int) -> NDArray[np.int64]:
         # max first: now_ns - _NEVER would overflow.
         return np.maximum(now_ns - np.maximum(self._tag_ns, 0), 0)
+
+
+@compiled
+def _first_early(
+    payload_row: NDArray[np.int64],
+    arrivals_ns: NDArray[np.int64],
+    fates: NDArray[np.uint8],
+    tags_ns: NDArray[np.int64],
+) -> int:
+    """Return the first delivery (of r) of an accepted frame whose tag lies behind it, or -1."""
+    for i in range(len(payload_row)):
+        row = payload_row[i]
+        if tags_ns[row] > arrivals_ns[i] + _TAG_ROUNDING_NS and fates[row] == _ACCEPTED:
+            return i
+    return -1
 
 
 @compiled
