@@ -6,7 +6,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tieline.c37118.batch import Verdict, checked_idcodes, decode_frames, times_ns
+from tieline.c37118.batch import Verdict, checked_idcodes, read_frames
 from tieline.compiled import compiled
 from tieline.errors import CosimError, InputError
 from tieline.units import NS_PER_S
@@ -156,15 +156,11 @@ class WideAreaAverage:
 
     def read(self, payloads: NDArray[np.uint8]) -> Readings:
         """Return what the frames (m, size) say, for `apply`; no controller holds them yet."""
-        frames, verdicts = decode_frames(payloads)
-        fates = _FATE_OF_VERDICT[verdicts]
-        sensors = self._sensor_of[frames["IDCODE"]]
+        frames = read_frames(payloads, self._epoch_s)
+        fates = _FATE_OF_VERDICT[frames.verdicts]
+        sensors = self._sensor_of[frames.idcodes]
         fates[(fates == _ACCEPTED) & (sensors == _UNKNOWN)] = Fate.UNKNOWN_IDCODE
-        tags_ns = times_ns(frames, self._epoch_s)
-        # A signalling NaN, of a frame that is refused, stays a NaN; NumPy warns of it.
-        with np.errstate(invalid="ignore"):
-            f_hz = frames["FREQ"].astype(np.float64)
-        return Readings(fates, sensors, tags_ns, f_hz)
+        return Readings(fates, sensors, frames.tags_ns, frames.f_hz)
 
     def apply(
         self,
