@@ -62,7 +62,8 @@ def test_a_bundle_with_a_missing_or_doubled_part_is_refused(spoil) -> None:
 
 
 @pytest.mark.parametrize(
-    "data", [b"", b"TLM", b"hello, this is not a message", b"TLM1" + b"\xff" * 9]
+    "data",
+    [b"", b"TLM", b"hello, this is not a message", b"TLM1" + bytes(13), b"TLM2" + b"\xff" * 13],
 )
 def test_bytes_of_somebody_else_are_refused(data: bytes) -> None:
     """If not, a foreign federate's message would be taken for a bundle."""

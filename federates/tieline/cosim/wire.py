@@ -16,7 +16,7 @@ TOGETHER_BYTES = 500_000
 """Longest message made of several bundles; one bundle may be longer, where the core can."""
 
 _PART = struct.Struct("<4sBIHHI")
-_MAGIC = b"TLM1"
+_MAGIC = b"TLM2"
 _TOTALS = struct.Struct("<QQ32s")
 
 
