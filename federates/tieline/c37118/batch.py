@@ -129,10 +129,10 @@ def encode_frames(
     soc, fracsec = soc_fracsec(time_ns, epoch_s)
     n = len(phasors)
     return _written(
-        _column(idcodes, n, np.int64),
-        soc,
+        _column(idcodes, n, np.uint16),
+        int(np.uint32(soc)),
         time_quality << 24 | fracsec,
-        _column(stat, n, np.int64),
+        _column(stat, n, np.uint16),
         np.ascontiguousarray(phasors, np.complex128),
         _column(f_hz, n, np.float64),
         _column(rocof_hz_s, n, np.float64),
@@ -141,8 +141,8 @@ def encode_frames(
 
 def _column(values: ArrayLike, n: int, dtype: type[np.generic]) -> NDArray[Any]:
     """Return (n,) values that may be given as one for all."""
-    column = np.asarray(values, dtype)
-    return np.ascontiguousarray(np.broadcast_to(column, n)) if column.ndim == 0 else column
+    column = np.ascontiguousarray(values, dtype)
+    return column if column.shape == (n,) else np.ascontiguousarray(np.broadcast_to(column, n))
 
 
 def decode_frames(payloads: NDArray[np.uint8]) -> tuple[NDArray[np.void], NDArray[np.uint8]]:
@@ -183,19 +183,12 @@ def read_frames(payloads: NDArray[np.uint8], epoch_s: int = 0) -> Frames:
     return Frames(*_read(np.ascontiguousarray(payloads), epoch_s))
 
 
-def times_ns(frames: NDArray[np.void], epoch_s: int = 0) -> NDArray[np.int64]:
-    """Return the time tags (n,) of `frames`, in ns since the start of the run."""
-    fracsec = frames["FRACSEC"].astype(np.int64) & 0xFFFFFF
-    seconds = frames["SOC"].astype(np.int64) - epoch_s
-    return seconds * NS_PER_S + fracsec * (NS_PER_S // TIME_BASE)
-
-
 @compiled
 def _written(
-    idcodes: NDArray[np.int64],
+    idcodes: NDArray[np.uint16],
     soc: int,
     fracsec: int,
-    stat: NDArray[np.int64],
+    stat: NDArray[np.uint16],
     phasors: NDArray[np.complex128],
     f_hz: NDArray[np.float64],
     rocof_hz_s: NDArray[np.float64],
