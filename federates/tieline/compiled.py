@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numba
 from numba.core.compiler import Compiler, CompilerBase
 from numba.core.errors import NumbaExperimentalFeatureWarning
+from numba.core.registry import cpu_target
 from numba.typed import List
 
 from tieline import kernels
@@ -31,6 +32,12 @@ IS_ON = os.environ.get("TIELINE_COMPILER", "on") != "off"
 def cached() -> tuple[Path | None, int]:
     """Return the folder that takes compiled functions (None: there is none) and how many exist."""
     return kernels.folder(), kernels.count()
+
+
+def load_compiler() -> None:
+    """Import what the first compiled function of a process imports, half a second for each fork."""
+    if IS_ON:
+        cpu_target.typing_context.refresh()
 
 
 def compiled(function: Function) -> Function:

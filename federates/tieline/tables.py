@@ -18,8 +18,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import ArrayLike, NDArray
 
-from tieline.arrow_arrays import array
-from tieline.errors import CosimError, NumericalError
+from tieline.batches import batch_of
+from tieline.errors import CosimError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -137,7 +137,7 @@ class TableStream:
         arrays = {name: buffer[: self._filled] for name, buffer in self._buffers.items()}
         # Whatever comes of it, these rows are done with: a table is also closed after a failure.
         self._filled = 0
-        batch = _batch(self.path, self._schema, arrays)
+        batch = batch_of(self.path.name, self._schema, arrays)
         whole_bytes = self._sink.tell()
         try:
             self._writer.write_batch(batch)
@@ -221,7 +221,7 @@ def write_table(path: Path, columns: Sequence[Column], data: Mapping[str, ArrayL
     extra = {name: np.asarray(values) for name, values in data.items() if name not in arrays}
     _common_length(path, dict.fromkeys(schema.names), {**arrays, **extra})
     part = _part_of(path)
-    batch = _batch(path, schema, arrays)
+    batch = batch_of(path.name, schema, arrays)
     try:
         pq.write_table(pa.Table.from_batches([batch]), part, compression="zstd")
         part.replace(path)
@@ -276,18 +276,6 @@ def _numpy_type(dtype: str) -> "np.dtype[np.generic]":
 
 def _arrow_type(dtype: str) -> pa.DataType:
     return pa.string() if dtype == "str" else pa.from_numpy_dtype(np.dtype(dtype))
-
-
-def _batch(
-    path: Path, schema: pa.Schema, arrays: Mapping[str, NDArray[np.generic]]
-) -> pa.RecordBatch:
-    for name, values in arrays.items():
-        if values.dtype.kind == "f" and np.isinf(values).any():
-            row = int(np.argmax(np.isinf(values)))
-            when = f" at t = {arrays['t_s'][row]} s" if "t_s" in arrays else f" in row {row}"
-            raise NumericalError(f"{path.name}: {name} is not finite ({values[row]}){when}")
-    columns = [array(field.type, arrays[field.name]) for field in schema]
-    return pa.RecordBatch.from_arrays(columns, schema=schema)
 
 
 def _common_length(

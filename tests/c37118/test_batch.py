@@ -11,8 +11,8 @@ from tieline.c37118.batch import (
     Verdict,
     decode_frames,
     encode_frames,
+    read_frames,
     stream_config,
-    times_ns,
 )
 from tieline.c37118.timestamp import soc_fracsec
 from tieline.errors import FrameError
@@ -68,7 +68,7 @@ def test_a_batch_is_read_as_it_was_written(streams: list[tuple], time_ns: int) -
     assert frames["IDCODE"].tolist() == [stream[0] for stream in streams]
     assert frames["FREQ"].tolist() == [stream[3] for stream in streams]
     # the tag is the instant rounded to microseconds, half up
-    assert set(times_ns(frames, EPOCH_S)) <= {(time_ns + 500) // 1000 * 1000}
+    assert set(read_frames(rows, EPOCH_S).tags_ns) <= {(time_ns + 500) // 1000 * 1000}
 
 
 @given(st.integers(0, 8 * FRAME_BYTES - 1))

@@ -112,7 +112,6 @@ def test_the_grid_asks_two_microseconds_after_and_stamps_its_bundle_with_the_nex
         ("send", T1_NS),
         ("request", T1_NS + 2_000),
         ("send", T2_NS),
-        ("send", T2_NS),
         ("request", T2_NS + 2_000),
     ]
 
@@ -196,7 +195,7 @@ T4_NS = 66_666_666
 T5_NS = 83_333_333
 
 
-def test_with_a_lead_the_federates_meet_once_a_stride_and_stamp_for_the_next_meeting() -> None:
+def test_with_a_lead_the_federates_meet_once_a_stride_with_one_message() -> None:
     """If not, one federate would have to wait for the other at every turn."""
     arrivals = {
         1_000: [(0, bundle(0)), (0, bundle(1))],
@@ -210,12 +209,9 @@ def test_with_a_lead_the_federates_meet_once_a_stride_and_stamp_for_the_next_mee
         ("send", 0),
         ("request", 1_000),
         ("send", T2_NS),
-        ("send", T2_NS),
         ("request", T2_NS + 1_000),
         ("send", T4_NS),
-        ("send", T4_NS),
         ("request", T4_NS + 1_000),
-        ("send", T5_NS),
         ("send", T5_NS),
         ("request", T5_NS + 1_000),
     ]
@@ -234,9 +230,7 @@ def test_with_a_lead_the_network_hands_over_the_stride_after_the_one_that_begins
     run_network(network, Exchange("network", link, LEADING), LEADING)
     assert link.log == [
         ("send", 0),
-        ("send", 0),
         ("request", 1_000),
-        ("send", T2_NS),
         ("send", T2_NS),
         ("request", T2_NS + 1_000),
         ("send", T4_NS),

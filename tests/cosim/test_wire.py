@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tieline.cosim.wire import Kind, Ledger, join, read_part, split
+from tieline.cosim.wire import Kind, Ledger, join, put_together, read_parts, split
 from tieline.errors import CosimError
 
 
@@ -18,26 +18,57 @@ def test_a_bundle_comes_back_whatever_the_order_of_its_parts(
     messages = split(Kind.BUNDLE, 7, payload, limit_bytes)
     shuffler.shuffle(messages)
     assert all(limit_bytes is None or len(message) <= limit_bytes for message in messages)
-    parts = [read_part(message) for message in messages]
+    parts = [part for message in messages for part in read_parts(message)]
     assert {(part.kind, part.k) for part in parts} == {(Kind.BUNDLE, 7)}
     assert join(parts) == payload
+
+
+@given(
+    st.lists(st.binary(max_size=3_000), min_size=1, max_size=9),
+    st.sampled_from([None, 100, 3_800]),
+)
+def test_bundles_of_one_meeting_travel_together_in_their_order(
+    payloads: list[bytes], limit_bytes: int | None
+) -> None:
+    """If not, a meeting would cost a message for each interval, or tcp would lose a long one."""
+    alone = [m for k, body in enumerate(payloads) for m in split(Kind.BUNDLE, k, body, limit_bytes)]
+    messages = put_together(alone, limit_bytes)
+    assert b"".join(messages) == b"".join(alone)
+    if limit_bytes is None:
+        assert len(messages) == 1
+    else:
+        assert all(len(message) <= limit_bytes for message in messages)
+    parts = [part for message in messages for part in read_parts(message)]
+    for k, body in enumerate(payloads):
+        assert join(part for part in parts if part.k == k) == body
+
+
+def test_a_message_cut_anywhere_is_refused() -> None:
+    """If not, a bundle would lose its last deliveries silently."""
+    message = b"".join(split(Kind.BUNDLE, 0, b"frames", None) + split(Kind.BUNDLE, 1, b"", None))
+    whole = [len(split(Kind.BUNDLE, 0, b"frames", None)[0]), len(message)]
+    for end in set(range(len(message))) - set(whole):
+        with pytest.raises(CosimError, match="a message of"):
+            read_parts(message[:end])
 
 
 @pytest.mark.parametrize("spoil", [lambda p: p[1:], lambda p: p[:-1], lambda p: [p[0], *p]])
 def test_a_bundle_with_a_missing_or_doubled_part_is_refused(spoil) -> None:
     """If not, a message that HELICS lost would shorten a bundle silently."""
-    parts = [read_part(message) for message in split(Kind.BUNDLE, 0, bytes(10_000), 3_800)]
+    (message,) = put_together(split(Kind.BUNDLE, 0, bytes(10_000), 3_800), None)
+    parts = read_parts(message)
     with pytest.raises(CosimError, match="a bundle of 3 parts came as parts"):
         join(spoil(parts))
 
 
 @pytest.mark.parametrize(
-    "data", [b"", b"TLM", b"hello, this is not a message", b"TLM1" + b"\xff" * 9]
+    "data",
+    [b"", b"TLM", b"hello, this is not a message", b"TLM1" + bytes(13), b"TLM2" + b"\xff" * 13],
 )
 def test_bytes_of_somebody_else_are_refused(data: bytes) -> None:
     """If not, a foreign federate's message would be taken for a bundle."""
     with pytest.raises(CosimError, match="a message of"):
-        read_part(data)
+        read_parts(data)
 
 
 def test_two_ledgers_of_one_stream_agree() -> None:

@@ -20,7 +20,7 @@ from tieline.cosim.interfaces import (
     lag_ns,
 )
 from tieline.cosim.strangers import Strangers
-from tieline.cosim.wire import Kind, Ledger, join, read_part, split
+from tieline.cosim.wire import Kind, Ledger, join, put_together, read_parts, split
 from tieline.errors import CosimError, NumericalError
 
 CLOCK = Clock(60, 4)
@@ -41,7 +41,8 @@ def _parts(script: Script) -> None:
     limit = script.one([None, 40, 200])
     messages = split(Kind(script.below(2)), script.below(100), _bundle(), limit)
     spoilt = [edited(message, script) if script.below(3) else message for message in messages]
-    join([read_part(message) for message in spoilt])
+    together = put_together(spoilt, limit)
+    join([part for message in together for part in read_parts(message)])
 
 
 def _frames(script: Script) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tieline.c37118.batch import decode_frames, encode_frames, times_ns
+from tieline.c37118.batch import encode_frames, read_frames
 from tieline.cosim.interfaces import DELIVERY, DeliveryBundle
 from tieline.grid.case import Case
 from tieline.grid.federate import GridFederate, open_participant
@@ -55,7 +55,7 @@ def delivered(k: int, *arrivals: tuple[int, int, np.ndarray], until_ns: int | No
     """
     rows, records = [np.zeros((0, 34), np.uint8)], []
     for arrival_ns, controller, frames in arrivals:
-        sequences = np.rint(times_ns(decode_frames(frames)[0]) * (RATE_HZ / NS_PER_S)).astype(int)
+        sequences = np.rint(read_frames(frames).tags_ns * (RATE_HZ / NS_PER_S)).astype(int)
         for source, sequence in enumerate(sequences):
             row = sum(map(len, rows)) + source
             records.append((arrival_ns, source, controller, sequence, row))

@@ -20,7 +20,7 @@ from grid.federate_runs import (
     opened,
     run_through,
 )
-from tieline.c37118.batch import decode_frames, times_ns
+from tieline.c37118.batch import decode_frames, read_frames
 from tieline.cosim.interfaces import FrameBundle
 from tieline.errors import CosimError, NumericalError, TimeContractBroken
 from tieline.grid.case import Case
@@ -45,7 +45,8 @@ def test_the_frames_say_what_the_pmus_measured(miniwecc: Case, tmp_path: Path) -
         assert not verdicts.any()
         assert frames["IDCODE"].tolist() == list(range(1, SENSORS + 1))
         # Time tags are whole microseconds.
-        np.testing.assert_allclose(times_ns(frames), bundle.measured_ns, rtol=0, atol=500)
+        tags_ns = read_frames(bundle.payloads).tags_ns
+        np.testing.assert_allclose(tags_ns, bundle.measured_ns, rtol=0, atol=500)
         for i, bus in enumerate(miniwecc.base.sensors):
             f_hz, v_pu = table[f"f_hz.B{bus}"][k], table[f"v_pu.B{bus}"][k]
             volts = v_pu * miniwecc.buses.base_kV[miniwecc.bus_index(bus)] * 1e3 / np.sqrt(3)

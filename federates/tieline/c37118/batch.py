@@ -4,6 +4,7 @@ The bytes are those of `DataFrame.to_bytes` with `stream_config`; only the speed
 """
 
 from enum import IntEnum
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,7 +44,15 @@ FRAME = np.dtype(
 
 FRAME_BYTES = FRAME.itemsize
 
-_CHK_BYTES = 2
+_PLACES = {name: int(place) for name, (_, place, *_) in (FRAME.fields or {}).items()}
+_SYNC_AT, _SIZE_AT, _IDCODE_AT, _SOC_AT, _FRACSEC_AT, _STAT_AT = (
+    _PLACES[name] for name in ("SYNC", "FRAMESIZE", "IDCODE", "SOC", "FRACSEC", "STAT")
+)
+_PHASOR_AT, _FREQ_AT, _DFREQ_AT, _CHK_AT = (
+    _PLACES[name] for name in ("PHASOR", "FREQ", "DFREQ", "CHK")
+)
+_EXPONENT = 0x7F80
+"""Bits of a float's first word that are all 1 where it is not finite (IEEE 754)."""
 _SYNC_2005, _SYNC_2011 = (SYNC_BYTE << 8 | FrameType.DATA << 4 | version for version in VERSIONS)
 _ERROR_BITS = StatBit.DATA_ERROR.value
 
@@ -118,20 +127,22 @@ def encode_frames(
         time_quality: time quality byte of every frame (Tables 3 and 4).
     """
     soc, fracsec = soc_fracsec(time_ns, epoch_s)
-    frames = np.zeros(len(phasors), FRAME)
-    frames["SYNC"] = _SYNC_2005
-    frames["FRAMESIZE"] = FRAME_BYTES
-    frames["IDCODE"] = idcodes
-    frames["SOC"] = soc
-    frames["FRACSEC"] = time_quality << 24 | fracsec
-    frames["STAT"] = stat
-    frames["PHASOR"][:, 0] = phasors.real
-    frames["PHASOR"][:, 1] = phasors.imag
-    frames["FREQ"] = f_hz
-    frames["DFREQ"] = rocof_hz_s
-    rows = frames.view(np.uint8).reshape(len(frames), FRAME_BYTES)
-    frames["CHK"] = crc_of_rows(rows[:, :-_CHK_BYTES])
-    return rows
+    n = len(phasors)
+    return _written(
+        _column(idcodes, n, np.uint16),
+        int(np.uint32(soc)),
+        time_quality << 24 | fracsec,
+        _column(stat, n, np.uint16),
+        np.ascontiguousarray(phasors, np.complex128),
+        _column(f_hz, n, np.float64),
+        _column(rocof_hz_s, n, np.float64),
+    )
+
+
+def _column(values: ArrayLike, n: int, dtype: type[np.generic]) -> NDArray[Any]:
+    """Return (n,) values that may be given as one for all."""
+    column = np.ascontiguousarray(values, dtype)
+    return column if column.shape == (n,) else np.ascontiguousarray(np.broadcast_to(column, n))
 
 
 def decode_frames(payloads: NDArray[np.uint8]) -> tuple[NDArray[np.void], NDArray[np.uint8]]:
@@ -144,46 +155,126 @@ def decode_frames(payloads: NDArray[np.uint8]) -> tuple[NDArray[np.void], NDArra
     if size != FRAME_BYTES:
         return np.zeros(n, FRAME), np.full(n, Verdict.SIZE, np.uint8)
     rows = np.ascontiguousarray(payloads)
-    frames = rows.view(FRAME).reshape(n)
-    # A signalling NaN stays a NaN; NumPy warns of it.
-    with np.errstate(invalid="ignore"):
-        f_hz = frames["FREQ"].astype(np.float64)
-    return frames, _judge(
-        frames["SYNC"].astype(np.int64),
-        frames["FRAMESIZE"].astype(np.int64),
-        frames["STAT"].astype(np.int64),
-        f_hz,
-        frames["CHK"].astype(np.int64) == crc_of_rows(rows[:, :-_CHK_BYTES]),
-    )
+    return rows.view(FRAME).reshape(n), _read(rows, 0)[0]
 
 
-def times_ns(frames: NDArray[np.void], epoch_s: int = 0) -> NDArray[np.int64]:
-    """Return the time tags (n,) of `frames`, in ns since the start of the run."""
-    fracsec = frames["FRACSEC"].astype(np.int64) & 0xFFFFFF
-    seconds = frames["SOC"].astype(np.int64) - epoch_s
-    return seconds * NS_PER_S + fracsec * (NS_PER_S // TIME_BASE)
+class Frames(NamedTuple):
+    """What m frames say, all (m,).
+
+    Attributes:
+        verdicts: uint8, a `Verdict`; the rest means nothing where it is not `SOUND`.
+        idcodes: number of the stream.
+        tags_ns: time tag, ns since the start of the run.
+        f_hz: frequency, Hz.
+    """
+
+    verdicts: NDArray[np.uint8]
+    idcodes: NDArray[np.int64]
+    tags_ns: NDArray[np.int64]
+    f_hz: NDArray[np.float64]
+
+
+def read_frames(payloads: NDArray[np.uint8], epoch_s: int = 0) -> Frames:
+    """Return what a controller takes from frames (m, size); another size than 34 is refused."""
+    m, size = payloads.shape
+    if size != FRAME_BYTES:
+        none = np.zeros(m, np.int64)
+        return Frames(np.full(m, _SIZE, np.uint8), none, none, np.zeros(m))
+    return Frames(*_read(np.ascontiguousarray(payloads), epoch_s))
 
 
 @compiled
-def _judge(
-    sync: NDArray[np.int64],
-    size: NDArray[np.int64],
-    stat: NDArray[np.int64],
+def _written(
+    idcodes: NDArray[np.uint16],
+    soc: int,
+    fracsec: int,
+    stat: NDArray[np.uint16],
+    phasors: NDArray[np.complex128],
     f_hz: NDArray[np.float64],
-    has_right_crc: NDArray[np.bool_],
+    rocof_hz_s: NDArray[np.float64],
 ) -> NDArray[np.uint8]:
-    """Return the `Verdict` on each frame from its words, all (n,)."""
-    verdicts = np.empty(len(sync), np.uint8)
-    for i in range(len(sync)):
-        verdicts[i] = _SOUND
-        if size[i] != FRAME_BYTES:
-            verdicts[i] = _SIZE
-        elif sync[i] != _SYNC_2005 and sync[i] != _SYNC_2011:
-            verdicts[i] = _BAD_SYNC
-        elif not has_right_crc[i]:
-            verdicts[i] = _CRC
-        elif stat[i] & _ERROR_BITS:
-            verdicts[i] = _DATA_ERROR
-        elif not np.isfinite(f_hz[i]):
-            verdicts[i] = _NO_FREQUENCY
-    return verdicts
+    """Return the frames (n, 34) of n streams, each column (n,)."""
+    rows = np.empty((len(phasors), FRAME_BYTES), np.uint8)
+    for i in range(len(rows)):
+        row = rows[i]
+        _put(row, _SYNC_AT, _SYNC_2005)
+        _put(row, _SIZE_AT, FRAME_BYTES)
+        _put(row, _IDCODE_AT, idcodes[i])
+        _put_long(row, _SOC_AT, soc)
+        _put_long(row, _FRACSEC_AT, fracsec)
+        _put(row, _STAT_AT, stat[i])
+        _put_float(row, _PHASOR_AT, phasors[i].real)
+        _put_float(row, _PHASOR_AT + 4, phasors[i].imag)
+        _put_float(row, _FREQ_AT, f_hz[i])
+        _put_float(row, _DFREQ_AT, rocof_hz_s[i])
+    crc = crc_of_rows(rows[:, :_CHK_AT])
+    for i in range(len(rows)):
+        _put(rows[i], _CHK_AT, crc[i])
+    return rows
+
+
+@compiled
+def _read(
+    rows: NDArray[np.uint8], epoch_s: int
+) -> tuple[NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Return the columns of `Frames` from the frames' bytes (m, 34)."""
+    m = len(rows)
+    verdicts, idcodes = np.empty(m, np.uint8), np.empty(m, np.int64)
+    tags_ns, f_hz = np.empty(m, np.int64), np.empty(m)
+    crc = crc_of_rows(rows[:, :_CHK_AT])
+    for i in range(m):
+        row = rows[i]
+        verdicts[i] = _judge(row, crc[i])
+        idcodes[i] = _word(row, _IDCODE_AT)
+        seconds, fracsec = _long(row, _SOC_AT) - epoch_s, _long(row, _FRACSEC_AT) & 0xFFFFFF
+        tags_ns[i] = seconds * NS_PER_S + fracsec * (NS_PER_S // TIME_BASE)
+        f_hz[i] = np.uint32(_long(row, _FREQ_AT)).view(np.float32)
+    return verdicts, idcodes, tags_ns, f_hz
+
+
+@compiled
+def _judge(row: NDArray[np.uint8], crc: int) -> int:
+    """Return the `Verdict` on a frame (34,) whose bytes have a CRC."""
+    sync = _word(row, _SYNC_AT)
+    if _word(row, _SIZE_AT) != FRAME_BYTES:
+        return _SIZE
+    if sync != _SYNC_2005 and sync != _SYNC_2011:
+        return _BAD_SYNC
+    if _word(row, _CHK_AT) != crc:
+        return _CRC
+    if _word(row, _STAT_AT) & _ERROR_BITS:
+        return _DATA_ERROR
+    if _word(row, _FREQ_AT) & _EXPONENT == _EXPONENT:
+        return _NO_FREQUENCY
+    return _SOUND
+
+
+@compiled
+def _word(row: NDArray[np.uint8], at: int) -> int:
+    """Return the two bytes at a place as the number that they send."""
+    return int(row[at]) << 8 | int(row[at + 1])
+
+
+@compiled
+def _long(row: NDArray[np.uint8], at: int) -> int:
+    """Return the four bytes at a place as the number that they send."""
+    return _word(row, at) << 16 | _word(row, at + 2)
+
+
+@compiled
+def _put(row: NDArray[np.uint8], at: int, value: int) -> None:
+    """Write the low two bytes of a number at a place."""
+    row[at], row[at + 1] = (value >> 8) & 0xFF, value & 0xFF
+
+
+@compiled
+def _put_long(row: NDArray[np.uint8], at: int, value: int) -> None:
+    """Write the low four bytes of a number at a place."""
+    _put(row, at, value >> 16)
+    _put(row, at + 2, value)
+
+
+@compiled
+def _put_float(row: NDArray[np.uint8], at: int, value: float) -> None:
+    """Write a number at a place in single precision."""
+    _put_long(row, at, int(np.float32(value).view(np.uint32)))

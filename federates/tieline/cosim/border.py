@@ -58,12 +58,12 @@ class DeliveryBorder:
                 f" which must be {until_ns} ns"
             )
         self._is_delivered[k % FRAMES_REMEMBERED] = False
-        records = bundle.records
+        columns = bundle.columns
         place, fault = _fault(
-            records["arrival_ns"].astype(np.int64),
-            records["source"].astype(np.int64),
-            records["destination"].astype(np.int64),
-            records["sequence"].astype(np.int64),
+            columns.arrival_ns,
+            columns.source,
+            columns.destination,
+            columns.sequence,
             k,
             since_ns,
             until_ns,
@@ -71,7 +71,7 @@ class DeliveryBorder:
             self._is_delivered,
         )
         if place != _SOUND:
-            self._refuse(k, records, int(place), int(fault))
+            self._refuse(k, bundle.records, int(place), int(fault))
 
     def _refuse(self, k: int, records: NDArray[np.void], place: int, fault: int) -> None:
         record: Any = records[place]

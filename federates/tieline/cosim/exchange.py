@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from tieline.cosim.interfaces import GRID, NETWORK, Clock, Participant, lag_ns
-from tieline.cosim.wire import Kind, Ledger, Part, join, read_part, split
+from tieline.cosim.wire import Kind, Ledger, Part, join, put_together, read_parts, split
 from tieline.errors import CosimError, TimeContractBroken
 from tieline.units import ns_to_seconds
 
@@ -44,6 +44,7 @@ class Exchange:
     network is granted t_k + 1 us and sends its bundle then; the grid, granted t_k + 2 us, has it at
     once and stamps its own bundle t_k+1, to which HELICS holds it. With a lead both are granted
     t_k + 1 us, work side by side, and stamp all that they send with the next meeting's instant.
+    What has one stamp goes as one message, before the next grant is asked for.
     """
 
     def __init__(
@@ -58,6 +59,8 @@ class Exchange:
         self._clock = clock
         self._observer = observer
         self._arrived: dict[tuple[Kind, int], list[Part]] = {}
+        self._unsent: list[bytes] = []
+        self._unsent_ns = 0
         self.sent = Ledger()
         self.received = Ledger()
 
@@ -67,6 +70,7 @@ class Exchange:
         Raises:
             TimeContractBroken: another time was granted than asked for.
         """
+        self._flush()
         asked_ns = self._clock.at_ns(k) + lag_ns(self._name, self._clock)
         if self._observer is not None:
             self._observer.wait()
@@ -100,6 +104,7 @@ class Exchange:
         """Tell the peer how much was sent, and its hash, at the last meeting."""
         last = self._clock.intervals
         self._send(Kind.END, last, self.sent.to_bytes(), self._stamp_ns(self._name, last))
+        self._flush()
 
     def check_end(self) -> None:
         """Compare the peer's end marker with what came.
@@ -118,21 +123,28 @@ class Exchange:
         return self._clock.at_ns(meeting) + lag
 
     def _send(self, kind: Kind, k: int, payload: bytes, at_ns: int) -> None:
-        for message in split(kind, k, payload, self._link.limit_bytes):
-            self._link.send(message, at_ns)
+        if at_ns != self._unsent_ns:
+            self._flush()
+        self._unsent_ns = at_ns
+        self._unsent += split(kind, k, payload, self._link.limit_bytes)
+
+    def _flush(self) -> None:
+        for message in put_together(self._unsent, self._link.limit_bytes):
+            self._link.send(message, self._unsent_ns)
+        self._unsent.clear()
 
     def _collect(self, meeting: int) -> None:
         expected_ns = self._stamp_ns(PEER[self._name], meeting)
         due = bundles_due(self._name, meeting, self._clock)
         for stamp_ns, data in self._link.receive():
-            part = read_part(data)
-            if stamp_ns != expected_ns or part.k not in due:
-                raise TimeContractBroken(
-                    f"{self._name} in interval {meeting}: {PEER[self._name]}'s "
-                    f"{part.kind.name.lower()} {part.k} came stamped {stamp_ns} ns, "
-                    f"the contract says {_shown(due)} at {expected_ns} ns"
-                )
-            self._arrived.setdefault((part.kind, part.k), []).append(part)
+            for part in read_parts(data):
+                if stamp_ns != expected_ns or part.k not in due:
+                    raise TimeContractBroken(
+                        f"{self._name} in interval {meeting}: {PEER[self._name]}'s "
+                        f"{part.kind.name.lower()} {part.k} came stamped {stamp_ns} ns, "
+                        f"the contract says {_shown(due)} at {expected_ns} ns"
+                    )
+                self._arrived.setdefault((part.kind, part.k), []).append(part)
 
     def _take(self, kind: Kind, k: int) -> bytes:
         parts = self._arrived.pop((kind, k), None)

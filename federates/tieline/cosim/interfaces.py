@@ -1,9 +1,11 @@
 """What crosses the border between the federates: names, clock, bundles, the participant's shape."""
 
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, Protocol, Self
+from typing import Any, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +31,9 @@ DELIVERY = np.dtype(
 )
 """One packet handed to its controller; `payload` is a row of the bundle's payload table."""
 
-_FRAMES = np.dtype([("magic", "S4"), ("at_ns", "<i8"), ("count", "<u4"), ("size_bytes", "<u4")])
-_DELIVERIES = np.dtype(
-    [("magic", "S4"), ("at_ns", "<i8"), ("count", "<u4"), ("size_bytes", "<u4"), ("records", "<u4")]
-)
+# The word, the instant, how many payloads and of how many bytes, and how many records.
+_FRAMES = struct.Struct("<4sqII")
+_DELIVERIES = struct.Struct("<4sqIII")
 
 
 class FederationSettings(BaseModel):
@@ -167,8 +168,8 @@ class FrameBundle:
 
     def to_bytes(self) -> bytes:
         """Return the bundle as one message."""
-        head = np.array([(b"TLF1", self.measured_ns, *self.payloads.shape)], dtype=_FRAMES)
-        return head.tobytes() + self.payloads.tobytes()
+        head = _FRAMES.pack(b"TLF1", self.measured_ns, *self.payloads.shape)
+        return head + self.payloads.tobytes()
 
     @classmethod
     def from_bytes(cls, data: bytes) -> "FrameBundle":
@@ -177,11 +178,20 @@ class FrameBundle:
         Raises:
             CosimError: the message is no frame bundle.
         """
-        head = _head(data, _FRAMES, b"TLF1")
-        count, size = int(head["count"]), int(head["size_bytes"])
-        _check_length(data, _FRAMES.itemsize + count * size)
-        payloads = np.frombuffer(data, np.uint8, count * size, _FRAMES.itemsize)
-        return cls(int(head["at_ns"]), payloads.reshape(count, size))
+        measured_ns, count, size = _head(data, _FRAMES, b"TLF1")
+        _check_length(data, _FRAMES.size + count * size)
+        payloads = np.frombuffer(data, np.uint8, count * size, _FRAMES.size)
+        return cls(measured_ns, payloads.reshape(count, size))
+
+
+class Deliveries(NamedTuple):
+    """The columns (m,) of `DELIVERY`, as whole numbers of one kind."""
+
+    arrival_ns: NDArray[np.int64]
+    source: NDArray[np.int64]
+    destination: NDArray[np.int64]
+    sequence: NDArray[np.int64]
+    payload: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -199,8 +209,13 @@ class DeliveryBundle:
     def to_bytes(self) -> bytes:
         """Return the bundle as one message."""
         shape = (*self.payloads.shape, len(self.records))
-        head = np.array([(b"TLD1", self.until_ns, *shape)], dtype=_DELIVERIES)
-        return head.tobytes() + self.payloads.tobytes() + self.records.tobytes()
+        head = _DELIVERIES.pack(b"TLD1", self.until_ns, *shape)
+        return head + self.payloads.tobytes() + self.records.tobytes()
+
+    @cached_property
+    def columns(self) -> "Deliveries":
+        """The records' columns, for compiled code."""
+        return Deliveries(*(self.records[name].astype(np.int64) for name in Deliveries._fields))
 
     @classmethod
     def from_bytes(cls, data: bytes) -> "DeliveryBundle":
@@ -209,22 +224,22 @@ class DeliveryBundle:
         Raises:
             CosimError: the message is no delivery bundle, or a record names a payload it lacks.
         """
-        head = _head(data, _DELIVERIES, b"TLD1")
-        count, size, records = (int(head[key]) for key in ("count", "size_bytes", "records"))
-        start = _DELIVERIES.itemsize + count * size
+        until_ns, count, size, records = _head(data, _DELIVERIES, b"TLD1")
+        start = _DELIVERIES.size + count * size
         _check_length(data, start + records * DELIVERY.itemsize)
-        payloads = np.frombuffer(data, np.uint8, count * size, _DELIVERIES.itemsize)
+        payloads = np.frombuffer(data, np.uint8, count * size, _DELIVERIES.size)
         table = np.frombuffer(data, DELIVERY, records, start)
         if records and int(table["payload"].max()) >= count:
             raise CosimError(f"a delivery names payload {table['payload'].max()} of {count}")
-        return cls(int(head["at_ns"]), table, payloads.reshape(count, size))
+        return cls(until_ns, table, payloads.reshape(count, size))
 
 
-def _head(data: bytes, layout: "np.dtype[np.void]", magic: bytes) -> np.void:
-    if len(data) < layout.itemsize or data[:4] != magic:
+def _head(data: bytes, layout: struct.Struct, magic: bytes) -> tuple[int, ...]:
+    """Return the numbers that a bundle begins with."""
+    if len(data) < layout.size or data[: len(magic)] != magic:
         raise CosimError(f"expected a {magic.decode()} bundle, got {len(data)} bytes {data[:8]!r}")
-    head: np.void = np.frombuffer(data, layout, 1)[0]
-    return head
+    _, *numbers = layout.unpack_from(data)
+    return tuple(numbers)
 
 
 def _check_length(data: bytes, expected: int) -> None:

@@ -1,4 +1,4 @@
-"""How a bundle becomes one HELICS message or several, and how both ends prove that none is lost."""
+"""How bundles become HELICS messages, and how both ends prove that none is lost."""
 
 import hashlib
 import struct
@@ -12,8 +12,11 @@ from tieline.errors import CosimError
 PART_LIMIT_BYTES = {"tcp": 3_800}
 """Longest message of a core, header included; HELICS 3.6.1 loses longer ones on tcp silently."""
 
-_PART = struct.Struct("<4sBIHH")
-_MAGIC = b"TLM1"
+TOGETHER_BYTES = 500_000
+"""Longest message made of several bundles; one bundle may be longer, where the core can."""
+
+_PART = struct.Struct("<4sBIHHI")
+_MAGIC = b"TLM2"
 _TOTALS = struct.Struct("<QQ32s")
 
 
@@ -26,7 +29,7 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True)
 class Part:
-    """One HELICS message: part `index` of `count` of the bundle or end marker with number `k`."""
+    """Part `index` of `count` of the bundle or end marker with number `k`."""
 
     kind: Kind
     k: int
@@ -39,24 +42,53 @@ def split(kind: Kind, k: int, payload: bytes, limit_bytes: int | None) -> list[b
     """Return the messages that carry `payload`, none longer than `limit_bytes` (None: no limit)."""
     room = max(len(payload), 1) if limit_bytes is None else limit_bytes - _PART.size
     count = max(1, -(-len(payload) // room))
+    bodies = (payload[index * room : (index + 1) * room] for index in range(count))
     return [
-        _PART.pack(_MAGIC, kind, k, index, count) + payload[index * room : (index + 1) * room]
-        for index in range(count)
+        _PART.pack(_MAGIC, kind, k, index, count, len(body)) + body
+        for index, body in enumerate(bodies)
     ]
 
 
-def read_part(data: bytes) -> Part:
+def put_together(messages: Iterable[bytes], limit_bytes: int | None) -> list[bytes]:
+    """Return fewer messages that say the same in the same order; what HELICS does costs by message.
+
+    None of several is longer than `limit_bytes` (None: `TOGETHER_BYTES`).
+    """
+    limit = TOGETHER_BYTES if limit_bytes is None else limit_bytes
+    groups: list[list[bytes]] = []
+    size = limit
+    for message in messages:
+        size += len(message)
+        if size > limit:
+            groups.append([])
+            size = len(message)
+        groups[-1].append(message)
+    return [b"".join(group) for group in groups]
+
+
+def read_parts(data: bytes) -> list[Part]:
     """Return what one HELICS message holds.
 
     Raises:
         CosimError: it is no message of tieline.
     """
-    if len(data) < _PART.size or data[:4] != _MAGIC:
-        raise CosimError(f"a message of {len(data)} bytes is not tieline's: it begins {data[:8]!r}")
-    _, kind, k, index, count = _PART.unpack_from(data)
-    if kind not in tuple(Kind) or index >= count:
-        raise CosimError(f"a message of kind {kind} calls itself part {index} of {count}")
-    return Part(Kind(kind), k, index, count, data[_PART.size :])
+    parts: list[Part] = []
+    at = 0
+    while at < len(data) or not parts:
+        if len(data) - at < _PART.size or data[at : at + len(_MAGIC)] != _MAGIC:
+            raise CosimError(
+                f"a message of {len(data)} bytes is not tieline's: it has {data[at : at + 8]!r}"
+                f" at byte {at}"
+            )
+        _, kind, k, index, count, size = _PART.unpack_from(data, at)
+        at += _PART.size + size
+        if kind not in tuple(Kind) or index >= count or at > len(data):
+            raise CosimError(
+                f"a message of kind {kind} calls itself part {index} of {count}, to byte {at} of"
+                f" {len(data)}"
+            )
+        parts.append(Part(Kind(kind), k, index, count, data[at - size : at]))
+    return parts
 
 
 def join(parts: Iterable[Part]) -> bytes:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +30,8 @@ from tieline.grid.simulation import Grid, Reading
 from tieline.grid.system import build_system, sensor_average
 from tieline.tables import Column, write_table
 from tieline.units import NS_PER_S, seconds_to_ns, tick_ns
-from tieline.wams import Fate, PmuReporter, Readings, WideAreaAverage
+from tieline.wams import PmuReporter, Readings, WideAreaAverage
 from tieline.wams.settings import WamsSettings
-
-_TAG_ROUNDING_NS = 500
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -143,18 +142,18 @@ class GridFederate:
         bundle = DeliveryBundle.from_bytes(received)
         self._border.check(k, bundle)
         first, last = k * self._per_interval, (k + 1) * self._per_interval
-        arrivals_ns = bundle.records["arrival_ns"].astype(np.int64)
+        columns = bundle.columns
         # The first step boundary at or after each arrival.
-        ticks = -(-arrivals_ns * self._grid.steps_per_second // NS_PER_S)
+        ticks = -(-columns.arrival_ns * self._grid.steps_per_second // NS_PER_S)
         readings = self._belief.read(bundle.payloads)
-        _check_tags(bundle, arrivals_ns, readings)
+        _check_tags(bundle, readings)
         seen = 0
         for tick in sorted({*self._record_ticks(first, last), first, last}):
             until = int(np.searchsorted(ticks, tick, side="right"))
             if until > seen:
-                records = bundle.records[seen:until]
+                some = slice(seen, until)
                 due, wbar_pu = self._belief.apply(
-                    readings, records["destination"], records["payload"], ticks[seen:until]
+                    readings, columns.destination[some], columns.payload[some], ticks[some]
                 )
                 told = np.ones((len(due), len(self._run.case.units)))
                 told[:, self._run.fitted] = wbar_pu
@@ -244,8 +243,10 @@ class GridFederate:
         }
         at_s = self._grid.tick / self._grid.steps_per_second
         for name, values in quantities.items():
-            buses = [f"{name}.B{bus}" for bus in self._sensors]
-            check_finite(values, buses.__getitem__, at_s, LARGEST_IN_A_FRAME)
+            check_finite(values, partial(self._name_of, name), at_s, LARGEST_IN_A_FRAME)
+
+    def _name_of(self, quantity: str, sensor: int) -> str:
+        return f"{quantity}.B{self._sensors[sensor]}"
 
     def _note_age(self) -> None:
         """Say how old the controllers' data are at the row that the grid writes next."""
@@ -259,20 +260,20 @@ class GridFederate:
         self._recorder.age(age_s)
 
 
-def _check_tags(bundle: DeliveryBundle, arrivals_ns: Integers, readings: Readings) -> None:
+def _check_tags(bundle: DeliveryBundle, readings: Readings) -> None:
     """Refuse a sound frame that says itself that it was measured after its arrival.
 
     Raises:
         TimeContractBroken: there is one.
     """
-    rows = bundle.records["payload"]
-    # Time tags are whole microseconds, rounded.
-    is_early = readings.tags_ns[rows] > arrivals_ns + _TAG_ROUNDING_NS
-    for place in np.flatnonzero(is_early & (readings.fates[rows] == Fate.ACCEPTED))[:1]:
+    columns = bundle.columns
+    place = readings.first_early(columns.payload, columns.arrival_ns)
+    if place is not None:
         record = bundle.records[place]
         raise TimeContractBroken(
             f"{GRID}: frame {record['sequence']} of PMU {record['source']} arrived at "
-            f"{arrivals_ns[place]} ns, but its time tag says {readings.tags_ns[rows[place]]} ns"
+            f"{record['arrival_ns']} ns, but its time tag says "
+            f"{readings.tags_ns[record['payload']]} ns"
         )
 
 

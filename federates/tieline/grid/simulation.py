@@ -32,7 +32,7 @@ from tieline.grid.topology import (
     units_in_service,
 )
 from tieline.grid.watch import Watch, centre_of_inertia, write_row
-from tieline.grid.wbar import hear, late_average, no_averages
+from tieline.grid.wbar import late_average, no_averages
 
 VREF = SIGNALS.index("Vref")
 
@@ -176,8 +176,9 @@ class Grid:
 
     def _hear(self) -> None:
         due = self._averages.due
-        if len(due) and due[0] <= self.tick <= due[-1] and np.any(due == self.tick):
-            hear(self._averages, self.tick, self._work.signals[WBAR])
+        place = int(np.searchsorted(due, self.tick))
+        if place < len(due) and due[place] == self.tick:
+            self._work.signals[WBAR] = self._averages.told[place]
             self._is_current = False
 
     def advance(self, to_tick: int) -> None:

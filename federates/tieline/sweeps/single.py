@@ -35,6 +35,9 @@ def launch_here(folder: Path, on_progress: Callable[[Progress], None]) -> Outcom
 
     for module in (*FEDERATES, *WITH_HELICS):
         importlib.import_module(module)
+    from tieline.compiled import load_compiler
+
+    load_compiler()
     start = forked if _can_fork() else executed
     with warnings.catch_warnings():
         # Python counts Arrow's thread.

@@ -6,7 +6,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tieline.c37118.batch import Verdict, checked_idcodes, decode_frames, times_ns
+from tieline.c37118.batch import Verdict, checked_idcodes, read_frames
 from tieline.compiled import compiled
 from tieline.errors import CosimError, InputError
 from tieline.units import NS_PER_S
@@ -14,6 +14,8 @@ from tieline.units import NS_PER_S
 _NEVER = np.iinfo(np.int64).min
 _UNKNOWN = -1
 _IDCODES = 1 << 16
+_TAG_ROUNDING_NS = 500
+"""Time tags are whole microseconds, rounded."""
 
 
 class Fate(IntEnum):
@@ -55,6 +57,18 @@ class Readings:
     sensors: NDArray[np.int32]
     tags_ns: NDArray[np.int64]
     f_hz: NDArray[np.float64]
+
+    def first_early(
+        self, payload_row: NDArray[np.int64], arrivals_ns: NDArray[np.int64]
+    ) -> int | None:
+        """Return the first delivery (of r) whose sound frame says that it was measured later.
+
+        Args:
+            payload_row: (r,) which frame each brings.
+            arrivals_ns: (r,) when it came.
+        """
+        place = int(_first_early(payload_row, arrivals_ns, self.fates, self.tags_ns))
+        return None if place < 0 else place
 
 
 def checked_weights(weights: ArrayLike | None, n_sensors: int) -> NDArray[np.float64]:
@@ -142,15 +156,11 @@ class WideAreaAverage:
 
     def read(self, payloads: NDArray[np.uint8]) -> Readings:
         """Return what the frames (m, size) say, for `apply`; no controller holds them yet."""
-        frames, verdicts = decode_frames(payloads)
-        fates = _FATE_OF_VERDICT[verdicts]
-        sensors = self._sensor_of[frames["IDCODE"]]
+        frames = read_frames(payloads, self._epoch_s)
+        fates = _FATE_OF_VERDICT[frames.verdicts]
+        sensors = self._sensor_of[frames.idcodes]
         fates[(fates == _ACCEPTED) & (sensors == _UNKNOWN)] = Fate.UNKNOWN_IDCODE
-        tags_ns = times_ns(frames, self._epoch_s)
-        # A signalling NaN, of a frame that is refused, stays a NaN; NumPy warns of it.
-        with np.errstate(invalid="ignore"):
-            f_hz = frames["FREQ"].astype(np.float64)
-        return Readings(fates, sensors, tags_ns, f_hz)
+        return Readings(fates, sensors, frames.tags_ns, frames.f_hz)
 
     def apply(
         self,
@@ -177,8 +187,8 @@ class WideAreaAverage:
         is_last[:-1] = moments[1:] != moments[:-1]
         wbar = np.empty((int(is_last.sum()), len(self._counts)))
         bad = _keep_newest(
-            destination.astype(np.int64),
-            payload_row.astype(np.int64),
+            destination.astype(np.int64, copy=False),
+            payload_row.astype(np.int64, copy=False),
             is_last,
             readings.fates,
             readings.sensors,
@@ -231,6 +241,21 @@ class WideAreaAverage:
     def _ages_ns(self, now_ns: int) -> NDArray[np.int64]:
         # max first: now_ns - _NEVER would overflow.
         return np.maximum(now_ns - np.maximum(self._tag_ns, 0), 0)
+
+
+@compiled
+def _first_early(
+    payload_row: NDArray[np.int64],
+    arrivals_ns: NDArray[np.int64],
+    fates: NDArray[np.uint8],
+    tags_ns: NDArray[np.int64],
+) -> int:
+    """Return the first delivery (of r) of an accepted frame whose tag lies behind it, or -1."""
+    for i in range(len(payload_row)):
+        row = payload_row[i]
+        if tags_ns[row] > arrivals_ns[i] + _TAG_ROUNDING_NS and fates[row] == _ACCEPTED:
+            return i
+    return -1
 
 
 @compiled
