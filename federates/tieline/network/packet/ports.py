@@ -95,7 +95,7 @@ def plan_of(hop: int, cells: Cells, at: Layout) -> int:
     return at.plans + _PLAN * cells[at.hops + hop]
 
 
-@compiled_from_zero
+@inlined
 def transmit(now: int, slot: int, hop: int, cells: Cells, at: Layout) -> int:
     """Return when the packet in `slot` reaches the end of the link, or one of the above.
 
