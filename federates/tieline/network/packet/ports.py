@@ -176,6 +176,9 @@ def _queue(now: int, start_ns: int, size: int, port: int, cells: Cells, at: Layo
     while waiting > 0 and cells[ring + _RING * head] <= now:
         head = head + 1 if head + 1 < room else 0
         waiting -= 1
+    if waiting == 0:
+        # A ring that always begins anew stays in the processor's cache.
+        head = 0
     is_accepted = waiting < room
     if is_accepted:
         tail = head + waiting
