@@ -28,6 +28,10 @@ NONE = -1
 NO_PORT, FORK = -1, -2
 """In place of a hop's port: the route ends, or the packet is copied to several hops."""
 
+PORT_BITS = 24
+PORT_MASK = (1 << PORT_BITS) - 1
+"""An entry of `hops` is the number of a plan above the number of its port less `FORK`."""
+
 # control: one row.
 HEAP_SIZE, NEXT_ORDER, FREE_PACKETS, ENDED, TAPPED, WANTS_DRAWS = range(6)
 
@@ -56,8 +60,9 @@ HEAD, TAIL, COUNT, HELD_BYTES, DEFICIT = range(3, 8)
 # red: thresholds (2^20 = one packet), probability (2^30 = 1), weight as a power of two, its state.
 RED_LOW, RED_HIGH, RED_PROBABILITY, RED_SHIFT, RED_STREAM, RED_AVERAGE, RED_COUNT = range(7)
 
-# hops: the plan of each link of each route, in the order of the route; after the last link comes a
-# plan with NO_PORT, or, where a tree branches, one with FORK and the range of `forks`.
+# hops: the plan and the port of each link of each route, in the order of the route (`PORT_BITS`).
+# After the last link comes a plan with NO_PORT, or, where a tree branches, one with FORK and the
+# range of `forks`.
 
 # plans: what a hop is like; flows whose packets are alike share it, so that the plans that matter
 # stay near the processor. Serialisation time is NONE where packets of a flow differ in size.
@@ -87,8 +92,9 @@ USED, FIRST_DRAW = range(2)
 # heap: pending events.
 TIME, ORDER, ITEM = range(3)
 
-# packets inside the network, by slot; IP_BYTES only where packets of a flow differ in size.
-FLOW, SEQUENCE, HOP, LOST, IP_BYTES, NEXT, PART = range(7)
+# packets inside the network, by slot; IP_BYTES only where packets of a flow differ in size. ONWARD
+# is what `hops` has for the hop after this one: on arrival plan and port are fetched side by side.
+FLOW, SEQUENCE, HOP, LOST, IP_BYTES, NEXT, PART, ONWARD = range(8)
 
 # ended: PMU packets that have ended since they were last collected.
 END_TIME, END_FLOW, END_SEQUENCE, END_HOW = range(4)
@@ -203,7 +209,12 @@ class Memory:
 
     def plans_of(self, hops: Cells | int) -> Cells:
         """Return the rows of `plans` (n, columns) of some hops (n,), or the row of one."""
-        return self.table("plans")[self.table("hops")[hops, 0]]
+        return self.table("plans")[self.plan_numbers_of(hops)]
+
+    def plan_numbers_of(self, hops: Cells | int) -> Cells:
+        """Return which row of `plans` is that of some hops (n,), or of one."""
+        numbers: Cells = self.table("hops")[hops, 0] >> PORT_BITS
+        return numbers
 
     def inside(self) -> Cells:
         """Return the slots of the packets inside the network, ascending."""
