@@ -78,7 +78,7 @@ class Recorder:
         self._flows.add_sent(sources, sequence)
 
     def add(self, outcome: Outcome, until_ns: int) -> None:
-        """Take what ended up to `until_ns`, the next of the `stops`.
+        """Take what ended up to `until_ns`, the next of the `stops`; it is kept for a while.
 
         Raises:
             CosimError: a packet ended twice.
