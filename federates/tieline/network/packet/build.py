@@ -130,6 +130,7 @@ class _Ports:
 
     def __init__(self, spec: NetworkSpec, supplies: Supplies) -> None:
         self.table = np.zeros((2 * len(spec.links), COLUMNS["ports"]), dtype=np.int64)
+        self.table[:, [LOSS_STREAM, EVENT_STREAM, JITTER_STREAM, RED, PEER]] = NONE
         self.classes: list[tuple[int, ...]] = []
         self.red: list[tuple[int, ...]] = []
         self.ring = 0
@@ -137,7 +138,6 @@ class _Ports:
         for (origin, target), number in spec.ports.items():
             link = spec.links[number // 2]
             row = self.table[number]
-            row[[LOSS_STREAM, EVENT_STREAM, JITTER_STREAM, RED, PEER]] = NONE
             row[PROPAGATION], row[RATE], row[OVERHEAD] = (
                 link.propagation_ns,
                 link.rate_bps,

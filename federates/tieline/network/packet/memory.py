@@ -134,6 +134,8 @@ GROWING = ("heap", "packets", "free", "ended")
 
 HEAP_COLUMNS = COLUMNS["heap"]
 
+_ROWS_AT_ONCE = 1 << 14
+
 
 class Layout(NamedTuple):
     """Where each table begins, and the numbers that bound the kernel's loops.
@@ -194,7 +196,7 @@ class Memory:
         self._rows.update(dict.fromkeys(self._growing, capacity))
         self._allocate()
         for name, content in tables.items():
-            self.table(name)[:] = content
+            _copy(content, self.table(name))
         self.table("free")[:, 0] = np.arange(capacity)[::-1]
         self.control[FREE_PACKETS] = capacity
 
@@ -255,7 +257,7 @@ class Memory:
         self._rows.update(dict.fromkeys(self._growing, 2 * old))
         self._allocate()
         for name, content in contents.items():
-            self.table(name)[: len(content)] = content
+            _copy(content, self.table(name))
         self.free(np.arange(old, 2 * old))
 
     def _allocate(self) -> None:
@@ -272,3 +274,15 @@ class Memory:
             name: self.cells[start : start + self._rows[name] * columns].reshape(-1, columns)
             for (name, columns), start in zip(COLUMNS.items(), starts.values(), strict=True)
         }
+
+
+def _copy(content: Cells, table: Cells) -> None:
+    """Write the rows of a table to another one of zeros, which has as many or more.
+
+    Zeros are not written: the rings of 10,000 links would take hundreds of megabytes before
+    anything waits there.
+    """
+    for start in range(0, len(content), _ROWS_AT_ONCE):
+        rows = content[start : start + _ROWS_AT_ONCE]
+        if rows.any():
+            table[start : start + len(rows)] = rows
