@@ -93,6 +93,7 @@ def bytes_of(nodes: int, pmus: int, controllers: int) -> int:
             recorder.add_sent(np.arange(pmus), k)
             until_ns = (k + 1) * 10**9 // RATE_HZ
             recorder.add(engine.run_until(until_ns), until_ns)
+        recorder.check()
         gc.collect()
         held = tracemalloc.get_traced_memory()[0]
         recorder.write()

@@ -16,13 +16,16 @@ from tieline.network.stats import FlowStatistics
 from tieline.network.streams_used import STREAMS, write_streams
 from tieline.units import NS_PER_S
 
+_MOST_HELD = 8_192
+"""Packets that are held before they are taken into account; their records have 16 bytes each."""
+
 
 class Recorder:
     """What becomes a network's tables.
 
     The caller runs the engine from one of the instants of `stops` to the next and hands over what
     ended on the way, so that windows are exact however often the federates meet. It is taken into
-    account a window at a time, or a second: many packets at once cost far less than few.
+    account a window at a time, or some thousand packets: many at once cost far less than few.
 
     Args:
         folder: where the tables go.
@@ -57,6 +60,7 @@ class Recorder:
         self._until_ns = 0
         self._flushed_ns = 0
         self._held: list[Outcome] = []
+        self._held_packets = 0
         if window_ns is not None:
             self._links = LinkSeries(folder / "link_series.parquet", engine)
             path = folder / "controller_series.parquet"
@@ -84,7 +88,10 @@ class Recorder:
             CosimError: a packet ended twice.
         """
         self._held.append(outcome)
+        self._held_packets += len(outcome.arrivals) + len(outcome.drops)
         self._until_ns = until_ns
+        if self._held_packets >= _MOST_HELD:
+            self._settle()
         if self._window_ns is not None and until_ns == (self._windows + 1) * self._window_ns:
             self._close_window(self._window_ns)
         if until_ns - self._flushed_ns >= NS_PER_S:
@@ -142,6 +149,7 @@ class Recorder:
         if self._held:
             outcome = joined(self._held)
             self._held.clear()
+            self._held_packets = 0
             self._take(outcome)
 
     def _take(self, outcome: Outcome) -> None:
