@@ -42,5 +42,5 @@ def _first_of_doubles(cells: np.ndarray) -> int:
 @pytest.mark.skipif(not IS_ON, reason="without the compiler nothing counts references")
 def test_a_function_that_makes_an_array_is_refused():
     """Otherwise nobody would count who holds the array, and its memory would never come back."""
-    with pytest.raises(NumbaError, match="NRT"):
+    with pytest.raises(NumbaError):
         _first_of_doubles(np.arange(3))
