@@ -128,6 +128,8 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="file for the figures")
     options = parser.parse_args()
     rows, costs, logs = [], [], []
+    # What is loaded once is no flow's.
+    bytes_of(NODES[0], 2, 2)
     for nodes in NODES:
         what, side = f"network of {nodes:,} nodes and flows", isqrt(nodes)
         began = time.process_time()
