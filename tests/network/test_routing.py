@@ -4,6 +4,7 @@ import random
 from collections import Counter
 from dataclasses import replace
 
+import networkx as nx
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -181,3 +182,26 @@ routes:
         "network.yaml:13: routes.4 must join two nodes (got 'b' twice)",
         "network.yaml:15: a second route from b to a",
     ]
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_routes_are_those_of_another_search(seed):
+    """Otherwise the search might miss shorter ways, or take another one of several equal ways.
+
+    Of equal ways the node that is settled first wins, in networkx as here.
+    """
+    dice = random.Random(seed)
+    names = [f"n{number}" for number in range(dice.randint(2, 20))]
+    pairs = {tuple(sorted(dice.sample(names, 2))) for _ in range(dice.randint(1, 50))}
+    links = [link(a, b) for a, b in pairs]
+    graph = nx.Graph()
+    graph.add_nodes_from(sorted(names))
+    graph.add_edges_from(sorted(pairs))
+    before, _ = nx.dijkstra_predecessor_and_distance(graph, "n0")
+    routes = routes_from(["n0"], names, links)["n0"]
+    assert routes.keys() == before.keys()
+    for target, route in routes.items():
+        way = [target]
+        while before[way[-1]]:
+            way.append(before[way[-1]][0])
+        assert route == tuple(reversed(way))

@@ -175,7 +175,7 @@ def test_numbers_that_were_not_sent_are_no_losses():
     figures = statistics.figures()
     assert figures.variation_ns[0] == 1
     assert figures.loss_periods.tolist() == figures.reordered.tolist() == [0]
-    assert statistics._ends.shape == (1, 4)
+    assert statistics._ends.shape == (1, 2)
 
 
 @pytest.mark.parametrize("again", [0, 2])

@@ -169,7 +169,7 @@ def test_a_window_holds_its_own_arrivals_only(tmp_path: Path) -> None:
     for k in range(1, 600):
         rows["sequence"], rows["arrival_ns"] = k - 1, tick_ns(k, RATE)
         recorder.add_sent(np.array([0]), k - 1)
-        recorder.add(Outcome(rows, NO_DROPS), tick_ns(k, RATE))
+        recorder.add(Outcome(rows.copy(), NO_DROPS), tick_ns(k, RATE))
         assert len(recorder._controllers._keys) <= 6
 
 

@@ -87,9 +87,20 @@ def joined(outcomes: Sequence[Outcome]) -> Outcome:
     if len(outcomes) == 1:
         return outcomes[0]
     return Outcome(
-        np.concatenate([outcome.arrivals for outcome in outcomes]),
-        np.concatenate([outcome.drops for outcome in outcomes]),
+        _one_after_another([outcome.arrivals for outcome in outcomes]),
+        _one_after_another([outcome.drops for outcome in outcomes]),
     )
+
+
+def _one_after_another(records: Sequence[NDArray[np.void]]) -> NDArray[np.void]:
+    """Return records of one type as one array.
+
+    They are joined as bare bytes: NumPy would work out anew, field by field, what is common to
+    types that are the same.
+    """
+    kind = records[0].dtype
+    whole: NDArray[np.void] = np.concatenate([each.view(f"V{kind.itemsize}") for each in records])
+    return whole.view(kind)
 
 
 @dataclass(frozen=True)

@@ -112,7 +112,8 @@ def _hand_over(
             continue
         for source in range(marks.shape[1]):
             if marks[place, source] < 0:
-                payloads[count] = frames[place, source]
+                for byte in range(frames.shape[2]):
+                    payloads[count, byte] = frames[place, source, byte]
                 marks[place, source] = count
                 count += 1
     for number in range(len(arrivals)):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tieline.errors import CosimError
 from tieline.network.age import AgeOfInformation
 from tieline.network.ended import ended
-from tieline.network.engine import NO_ARRIVALS, NO_DROPS, Engine, Outcome
+from tieline.network.engine import NO_ARRIVALS, NO_DROPS, Engine, Outcome, joined
 from tieline.network.results import PacketLog, write_ages, write_delays, write_flows, write_links
 from tieline.network.series import ControllerSeries, LinkSeries
 from tieline.network.spec import NetworkSpec, least_delay_ns
@@ -16,12 +16,16 @@ from tieline.network.stats import FlowStatistics
 from tieline.network.streams_used import STREAMS, write_streams
 from tieline.units import NS_PER_S
 
+_MOST_HELD = 8_192
+"""Packets that are held before they are taken into account; their records have 16 bytes each."""
+
 
 class Recorder:
     """What becomes a network's tables.
 
     The caller runs the engine from one of the instants of `stops` to the next and hands over what
-    ended on the way, so that windows are exact however often the federates meet.
+    ended on the way, so that windows are exact however often the federates meet. It is taken into
+    account a window at a time, or some thousand packets: many at once cost far less than few.
 
     Args:
         folder: where the tables go.
@@ -55,13 +59,15 @@ class Recorder:
         self._windows = 0
         self._until_ns = 0
         self._flushed_ns = 0
+        self._held: list[Outcome] = []
+        self._held_packets = 0
         if window_ns is not None:
             self._links = LinkSeries(folder / "link_series.parquet", engine)
             path = folder / "controller_series.parquet"
             self._controllers = ControllerSeries(path, spec, flow_of)
         write_streams(folder / STREAMS, engine.streams())
         # Compiles, where that is still to be done, before the federation waits for an answer.
-        self.add(Outcome(NO_ARRIVALS, NO_DROPS), 0)
+        self._take(Outcome(NO_ARRIVALS, NO_DROPS))
 
     def stops(self, until_ns: int) -> list[int]:
         """Return the ends of windows that the engine must stop at, and `until_ns`."""
@@ -76,23 +82,18 @@ class Recorder:
         self._flows.add_sent(sources, sequence)
 
     def add(self, outcome: Outcome, until_ns: int) -> None:
-        """Take what ended up to `until_ns`, the next of the `stops`.
+        """Take what ended up to `until_ns`, the next of the `stops`; it is kept for a while.
 
         Raises:
             CosimError: a packet ended twice.
         """
-        arrivals, drops = outcome.arrivals, outcome.drops
-        arrived = ended(arrivals, self._flow_of, self._rate_hz)
-        lost = ended(drops, self._flow_of, self._rate_hz)
+        self._held.append(outcome)
+        self._held_packets += len(outcome.arrivals) + len(outcome.drops)
         self._until_ns = until_ns
-        self._flows.add(arrived, lost, drops["reason"])
-        self._age.add(arrived.flows, arrived.ended_ns, arrived.measured_ns)
-        if self._log is not None:
-            self._log.add(arrived, lost, drops["reason"])
-        if self._window_ns is not None:
-            self._controllers.add(arrivals["destination"], arrived.delays_ns, drops)
-            if until_ns == (self._windows + 1) * self._window_ns:
-                self._close_window(self._window_ns)
+        if self._held_packets >= _MOST_HELD:
+            self._settle()
+        if self._window_ns is not None and until_ns == (self._windows + 1) * self._window_ns:
+            self._close_window(self._window_ns)
         if until_ns - self._flushed_ns >= NS_PER_S:
             self._flush()
 
@@ -106,6 +107,7 @@ class Recorder:
                 traffic and connections, whose packets only the engine counts, the sums are not
                 the engine's.
         """
+        self._settle()
         flows, counts = self._flows, self._engine.counts()
         counts.check(self._until_ns)
         for flow in np.flatnonzero(flows.in_flight < 0)[:1]:
@@ -125,6 +127,7 @@ class Recorder:
 
         Nothing can be added after it; writing again does no harm.
         """
+        self._settle()
         end_ns = self._until_ns
         write_flows(self._folder / "flows.parquet", self._spec, self._flows, self._age, end_ns)
         write_links(self._folder / "links.parquet", self._engine.links(), end_ns)
@@ -141,6 +144,25 @@ class Recorder:
             self._controllers.close()
             self._window_ns = None
 
+    def _settle(self) -> None:
+        """Take into account whatever is held."""
+        if self._held:
+            outcome = joined(self._held)
+            self._held.clear()
+            self._held_packets = 0
+            self._take(outcome)
+
+    def _take(self, outcome: Outcome) -> None:
+        arrivals, drops = outcome.arrivals, outcome.drops
+        arrived = ended(arrivals, self._flow_of, self._rate_hz)
+        lost = ended(drops, self._flow_of, self._rate_hz)
+        self._flows.add(arrived, lost, drops["reason"])
+        self._age.add(arrived.flows, arrived.ended_ns, arrived.measured_ns)
+        if self._log is not None:
+            self._log.add(arrived, lost, drops["reason"])
+        if self._window_ns is not None:
+            self._controllers.add(arrivals["destination"], arrived.delays_ns, drops)
+
     def _close_window(self, length_ns: int) -> None:
         self.check()
         self._links.close_window(self._until_ns, length_ns)
@@ -149,6 +171,7 @@ class Recorder:
 
     def _flush(self) -> None:
         """Keep the tables that grow abreast of the grid's, whoever is killed."""
+        self._settle()
         self._flushed_ns = self._until_ns
         if self._log is not None:
             self._log.flush()

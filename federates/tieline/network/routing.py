@@ -1,12 +1,12 @@
 """Routes: shortest by delay, hops or cost, split among equals, or fixed by hand."""
 
 import hashlib
+import heapq
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Literal
 
-import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,21 +52,21 @@ class Router:
         down: Collection[int] = (),
     ) -> None:
         self._routing = routing
-        self._graph: nx.Graph[str] = nx.Graph()
-        self._graph.add_nodes_from(sorted(nodes))
+        self._names = sorted(set(nodes))
+        self._number_of = {name: number for number, name in enumerate(self._names)}
+        self._lengths: list[dict[int, int]] = [{} for _ in self._names]
         up = [link for number, link in enumerate(links) if number not in down]
         # One more than any route has links: a route of fewer links wins among those of equal
         # length, and never against a shorter one.
-        scale = 1 if routing.is_split else len(self._graph) + 1
+        scale = 1 if routing.is_split else len(self._names) + 1
         for link in sorted(up, key=lambda link: sorted((link.a, link.b))):
             length = _length(link, routing.metric) * scale
             # No link has length zero: equal ways could go round in a circle.
             length = length or 1 if routing.is_split else length + 1
-            self._graph.add_edge(*sorted((link.a, link.b)), length=length)
-        self._names = list(self._graph)
-        self._number_of = {name: number for number, name in enumerate(self._names)}
+            a, b = sorted((self._number_of[link.a], self._number_of[link.b]))
+            self._lengths[a][b] = self._lengths[b][a] = length
         self._previous: dict[str, NDArray[np.int32]] = {}
-        self._before: dict[str, dict[str, list[str]]] = {}
+        self._before: dict[str, list[list[int]]] = {}
 
     def route(self, origin: str, target: str, flow: str = "") -> Route | None:
         """Return the route of a flow, or None if there is none.
@@ -96,26 +96,51 @@ class Router:
 
         A number for each node: whole paths would take memory with the square of the network.
         """
-        before, _ = nx.dijkstra_predecessor_and_distance(self._graph, origin, weight="length")
-        before[origin] = [origin]
-        tree = np.full(len(self._names), -1, dtype=np.int32)
-        for name, ways in before.items():
-            tree[self._number_of[name]] = self._number_of[ways[0]]
-        return tree
+        start = self._number_of[origin]
+        before = self._ways(start)
+        before[start] = [start]
+        return np.array([ways[0] if ways else -1 for ways in before], dtype=np.int32)
 
     def _spread(self, origin: str, target: str, flow: str) -> Route | None:
         """Walk back from the target, at each node along one of the equal ways."""
+        start, place = self._number_of[origin], self._number_of[target]
         if origin not in self._before:
-            before, _ = nx.dijkstra_predecessor_and_distance(self._graph, origin, weight="length")
-            self._before[origin] = before
-        ways = self._before[origin]
-        if target not in ways:
+            self._before[origin] = self._ways(start)
+        before = self._before[origin]
+        if place != start and not before[place]:
             return None
-        path = [target]
-        while path[-1] != origin:
-            choices = sorted(ways[path[-1]])
-            path.append(choices[_number(f"{flow} at {path[-1]}") % len(choices)])
-        return tuple(reversed(path))
+        path = [place]
+        while path[-1] != start:
+            choices = sorted(before[path[-1]])
+            number = _number(f"{flow} at {self._names[path[-1]]}")
+            path.append(choices[number % len(choices)])
+        return tuple(self._names[place] for place in reversed(path))
+
+    def _ways(self, start: int) -> list[list[int]]:
+        """Return the nodes that come before each on its shortest ways from a start.
+
+        They stand in the order in which the search settles them (Dijkstra 1959): by their own
+        distance, equal ones in the order in which that was found.
+        """
+        before: list[list[int]] = [[] for _ in self._names]
+        found: list[int | None] = [None] * len(self._names)
+        is_settled = bytearray(len(self._names))
+        found[start] = 0
+        pending, order = [(0, 0, start)], 1
+        while pending:
+            distance, _, node = heapq.heappop(pending)
+            if is_settled[node]:
+                continue
+            is_settled[node] = 1
+            for other, length in self._lengths[node].items():
+                known, way = found[other], distance + length
+                if known is None or way < known:
+                    found[other], before[other] = way, [node]
+                    heapq.heappush(pending, (way, order, other))
+                    order += 1
+                elif way == known:
+                    before[other].append(node)
+        return before
 
 
 def routes_from(

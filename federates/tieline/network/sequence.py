@@ -18,7 +18,7 @@ LOST = -2
 _UNKNOWN = -1
 _NOT_SENT = -3
 
-_FIRST_ROOM = 4
+_FIRST_ROOM = 2
 
 # Columns of a flow's state. Sequence numbers before NEXT are settled, EXPECTED follows the highest
 # one that has arrived.

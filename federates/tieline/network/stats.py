@@ -39,10 +39,10 @@ class FlowStatistics:
         flows = len(least_ns)
         self._least_ns = least_ns
         self._flow_of = flow_of
-        self.sent = np.zeros(flows, dtype=np.int64)
-        self.dropped_queue = np.zeros(flows, dtype=np.int64)
-        self.dropped_loss = np.zeros(flows, dtype=np.int64)
-        self.dropped_down = np.zeros(flows, dtype=np.int64)
+        self._sent = np.zeros(len(flow_of), dtype=np.int64)
+        self.dropped_queue = np.zeros(flows, dtype=np.uint32)
+        self.dropped_loss = np.zeros(flows, dtype=np.uint32)
+        self.dropped_down = np.zeros(flows, dtype=np.uint32)
         self.delay_counts = np.zeros(DELAY_BINS + 1, dtype=np.int64)
         self._delays = np.zeros((flows, 5), dtype=np.int64)
         self._smoothed_ns = np.zeros(flows)
@@ -50,6 +50,13 @@ class FlowStatistics:
         self._order = SequenceStatistics(flows)
         # Compiles, where that is still to be done, before the federation waits for an answer.
         self.add(NONE_ENDED, NONE_ENDED, np.empty(0, np.uint8))
+
+    @property
+    def sent(self) -> NDArray[np.int64]:
+        """Packets whose frame was measured."""
+        sent = np.zeros(len(self._least_ns), dtype=np.int64)
+        sent[self._flow_of] = self._sent[:, np.newaxis]
+        return sent
 
     @property
     def delivered(self) -> NDArray[np.int64]:
@@ -64,9 +71,8 @@ class FlowStatistics:
 
     def add_sent(self, sources: NDArray[np.int64], sequence: int) -> None:
         """Count packet `sequence` from each of these sources to every destination."""
-        flows = self._flow_of[sources].ravel()
-        self.sent[flows] += 1
-        self._order.add_sent(flows, sequence)
+        self._sent[sources] += 1
+        self._order.add_sent(self._flow_of[sources].ravel(), sequence)
 
     def add(self, arrived: Ended, lost: Ended, reasons: NDArray[np.uint8]) -> None:
         """Take what ended.

@@ -19,6 +19,7 @@ from tieline.network.packet.memory import (
     FIRST_CLASS,
     FIRST_COME,
     FIRST_DRAW,
+    FORK,
     GAP_STREAM,
     HAS_BYTES,
     HAS_JITTER,
@@ -26,6 +27,7 @@ from tieline.network.packet.memory import (
     HAS_RED,
     HAS_SERVER,
     HAS_TAP,
+    HOP_PORT,
     JITTER_STREAM,
     LOSS_LEFT,
     LOSS_STREAM,
@@ -35,6 +37,7 @@ from tieline.network.packet.memory import (
     PEER,
     PER_BIT,
     PER_PACKET,
+    PORT_BITS,
     PRIORITY,
     PROPAGATION,
     QUEUE,
@@ -81,7 +84,7 @@ def laid_out(spec: NetworkSpec, supplies: Supplies) -> tuple[Memory, Changes, Ro
         "ports": ports.table,
         "classes": _table("classes", ports.classes),
         "red": _table("red", ports.red),
-        "hops": _table("hops", ((plan,) for plan in routes.hops)),
+        "hops": _hops(routes),
         "plans": _table("plans", routes.plans),
         "forks": _table("forks", ((fork,) for fork in routes.forks)),
         "members": _table("members", ((flow,) for flow in routes.members)),
@@ -127,6 +130,7 @@ class _Ports:
 
     def __init__(self, spec: NetworkSpec, supplies: Supplies) -> None:
         self.table = np.zeros((2 * len(spec.links), COLUMNS["ports"]), dtype=np.int64)
+        self.table[:, [LOSS_STREAM, EVENT_STREAM, JITTER_STREAM, RED, PEER]] = NONE
         self.classes: list[tuple[int, ...]] = []
         self.red: list[tuple[int, ...]] = []
         self.ring = 0
@@ -134,7 +138,6 @@ class _Ports:
         for (origin, target), number in spec.ports.items():
             link = spec.links[number // 2]
             row = self.table[number]
-            row[[LOSS_STREAM, EVENT_STREAM, JITTER_STREAM, RED, PEER]] = NONE
             row[PROPAGATION], row[RATE], row[OVERHEAD] = (
                 link.propagation_ns,
                 link.rate_bps,
@@ -196,6 +199,12 @@ def _look_ahead(ports: Cells, streams: Cells) -> None:
     numbers = ports[lossy, LOSS_STREAM]
     ports[lossy, LOSS_LEFT] = streams[numbers, FIRST_DRAW]
     streams[numbers, USED] = 1
+
+
+def _hops(routes: Routes) -> Cells:
+    plans = np.array(routes.hops, dtype=np.int64)
+    ports = np.array([plan[HOP_PORT] for plan in routes.plans], dtype=np.int64)
+    return ((plans << PORT_BITS) + ports[plans] - FORK).reshape(-1, 1)
 
 
 def _destinations(spec: NetworkSpec, supplies: Supplies) -> Cells:

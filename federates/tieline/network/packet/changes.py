@@ -220,7 +220,7 @@ def _set_starts(now: int, port: int, before: Cells, old_rate: int, memory: Memor
     own = np.flatnonzero(on_port)
     waiting = own[np.argsort(events[own, ORDER])][-len(places) :]
     old_starts, sizes = ring[places, 0].copy(), ring[places, 1]
-    own_plans = memory.table("hops")[packets[slots[waiting], HOP], 0]
+    own_plans = memory.plan_numbers_of(packets[slots[waiting], HOP])
     is_sized = plans[own_plans, HOP_SERVICE] == NONE
     old = np.where(is_sized, _service_ns(sizes, old_rate), before[own_plans])
     new = _service_ns(sizes, int(row[RATE]))

@@ -30,7 +30,7 @@ class Endings:
     def __init__(self, spec: NetworkSpec) -> None:
         self._sources = len(spec.sources)
         self._ends = np.array(
-            [(flow.source, flow.destination) for flow in spec.flows], dtype=np.int64
+            [(flow.source, flow.destination) for flow in spec.flows], dtype=np.int32
         ).reshape(-1, 2)
         self._pending = np.empty((_FIRST_ROOM, 2), dtype=np.int64)
         self.held = 0
@@ -52,8 +52,9 @@ class Endings:
                 the time of a delivery is when its controller can use the frame.
         """
         if self.held + len(rows) > len(self._pending):
-            more = np.empty((self.held + len(rows), 2), dtype=np.int64)
-            self._pending = np.concatenate([self._pending, more])
+            room = (self.held + len(rows)) * 5 // 4
+            held = self._pending[: self.held]
+            self._pending = np.concatenate([held, np.empty((room - self.held, 2), dtype=np.int64)])
         drops = np.empty(len(rows), DROP)
         before = self.held
         self.held += _sort_out(rows, self._ends, self._pending[before:], drops)
@@ -77,7 +78,7 @@ class Endings:
 @compiled_from_zero
 def _sort_out(
     rows: NDArray[np.int64],
-    ends: NDArray[np.int64],
+    ends: NDArray[np.int32],
     pending: NDArray[np.int64],
     drops: NDArray[np.void],
 ) -> int:
@@ -85,7 +86,7 @@ def _sort_out(
     delivered = 0
     for place in range(len(rows)):
         flow, sequence = rows[place, END_FLOW], rows[place, END_SEQUENCE]
-        source, destination = ends[flow, 0], ends[flow, 1]
+        source, destination = np.int64(ends[flow, 0]), np.int64(ends[flow, 1])
         if rows[place, END_HOW] == DELIVERED:
             pending[delivered, _TIME] = rows[place, END_TIME]
             # 16, 31 and 16 bits, so that the numbers order as (source, sequence, destination).

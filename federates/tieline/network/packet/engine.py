@@ -233,6 +233,8 @@ class PacketEngine:
         memory = self._memory
         waiting = frames_announced(self._flows_of, memory.cells, memory.layout)
         connections = self._memory.table("connections")
+        if not len(connections):
+            return waiting
         connections = connections[connections[:, tcp.FRAMES_OF] != NONE]
         under_way = connections[:, tcp.AVAILABLE] - connections[:, tcp.EXPECTED]
         return waiting + int(under_way.sum())

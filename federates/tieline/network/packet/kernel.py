@@ -43,6 +43,7 @@ from tieline.network.packet.memory import (
     LOST,
     NO_PORT,
     NONE,
+    ONWARD,
     SENT,
     SEQUENCE,
     SIZE_STREAM,
@@ -63,7 +64,7 @@ from tieline.network.packet.packets import (
     enter_datagram,
     record_end,
 )
-from tieline.network.packet.ports import PORT_COLUMNS, WAITS, depart, plan_of, transmit
+from tieline.network.packet.ports import PORT_COLUMNS, WAITS, depart, plan_of, port_at, transmit
 
 DONE, NEEDS_ROOM, NEEDS_DRAWS = 0, 1, 2
 
@@ -150,11 +151,12 @@ def _arrive(now: int, slot: int, cells: Cells, at: Layout) -> None:
     """A packet reaches the end of a link, as the first event of the heap."""
     packet = at.packets + _PACKET * slot
     hop = cells[packet + HOP] + 1
-    port = cells[plan_of(hop, cells, at) + HOP_PORT]
+    way = cells[packet + ONWARD]
+    port = port_at(way)
     if cells[packet + LOST] != 0:
         _lose(now, slot, cells, at)
     elif port >= 0:
-        arrival_ns = transmit(now, slot, hop, cells, at)
+        arrival_ns = transmit(now, slot, hop, way, cells, at)
         if arrival_ns >= 0:
             size = cells[at.control + HEAP_SIZE]
             replace_first(cells, at.heap, size, arrival_ns, next_order(cells, at), 8 * slot)

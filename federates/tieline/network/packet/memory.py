@@ -28,6 +28,10 @@ NONE = -1
 NO_PORT, FORK = -1, -2
 """In place of a hop's port: the route ends, or the packet is copied to several hops."""
 
+PORT_BITS = 24
+PORT_MASK = (1 << PORT_BITS) - 1
+"""An entry of `hops` is the number of a plan above the number of its port less `FORK`."""
+
 # control: one row.
 HEAP_SIZE, NEXT_ORDER, FREE_PACKETS, ENDED, TAPPED, WANTS_DRAWS = range(6)
 
@@ -56,8 +60,9 @@ HEAD, TAIL, COUNT, HELD_BYTES, DEFICIT = range(3, 8)
 # red: thresholds (2^20 = one packet), probability (2^30 = 1), weight as a power of two, its state.
 RED_LOW, RED_HIGH, RED_PROBABILITY, RED_SHIFT, RED_STREAM, RED_AVERAGE, RED_COUNT = range(7)
 
-# hops: the plan of each link of each route, in the order of the route; after the last link comes a
-# plan with NO_PORT, or, where a tree branches, one with FORK and the range of `forks`.
+# hops: the plan and the port of each link of each route, in the order of the route (`PORT_BITS`).
+# After the last link comes a plan with NO_PORT, or, where a tree branches, one with FORK and the
+# range of `forks`.
 
 # plans: what a hop is like; flows whose packets are alike share it, so that the plans that matter
 # stay near the processor. Serialisation time is NONE where packets of a flow differ in size.
@@ -87,8 +92,9 @@ USED, FIRST_DRAW = range(2)
 # heap: pending events.
 TIME, ORDER, ITEM = range(3)
 
-# packets inside the network, by slot; IP_BYTES only where packets of a flow differ in size.
-FLOW, SEQUENCE, HOP, LOST, IP_BYTES, NEXT, PART = range(7)
+# packets inside the network, by slot; IP_BYTES only where packets of a flow differ in size. ONWARD
+# is what `hops` has for the hop after this one: on arrival plan and port are fetched side by side.
+FLOW, SEQUENCE, HOP, LOST, IP_BYTES, NEXT, PART, ONWARD = range(8)
 
 # ended: PMU packets that have ended since they were last collected.
 END_TIME, END_FLOW, END_SEQUENCE, END_HOW = range(4)
@@ -127,6 +133,8 @@ GROWING = ("heap", "packets", "free", "ended")
 """The tables with a row for each packet that may be inside; with links tapped, `taps` is one."""
 
 HEAP_COLUMNS = COLUMNS["heap"]
+
+_ROWS_AT_ONCE = 1 << 14
 
 
 class Layout(NamedTuple):
@@ -188,7 +196,7 @@ class Memory:
         self._rows.update(dict.fromkeys(self._growing, capacity))
         self._allocate()
         for name, content in tables.items():
-            self.table(name)[:] = content
+            _copy(content, self.table(name))
         self.table("free")[:, 0] = np.arange(capacity)[::-1]
         self.control[FREE_PACKETS] = capacity
 
@@ -203,7 +211,12 @@ class Memory:
 
     def plans_of(self, hops: Cells | int) -> Cells:
         """Return the rows of `plans` (n, columns) of some hops (n,), or the row of one."""
-        return self.table("plans")[self.table("hops")[hops, 0]]
+        return self.table("plans")[self.plan_numbers_of(hops)]
+
+    def plan_numbers_of(self, hops: Cells | int) -> Cells:
+        """Return which row of `plans` is that of some hops (n,), or of one."""
+        numbers: Cells = self.table("hops")[hops, 0] >> PORT_BITS
+        return numbers
 
     def inside(self) -> Cells:
         """Return the slots of the packets inside the network, ascending."""
@@ -244,7 +257,7 @@ class Memory:
         self._rows.update(dict.fromkeys(self._growing, 2 * old))
         self._allocate()
         for name, content in contents.items():
-            self.table(name)[: len(content)] = content
+            _copy(content, self.table(name))
         self.free(np.arange(old, 2 * old))
 
     def _allocate(self) -> None:
@@ -261,3 +274,15 @@ class Memory:
             name: self.cells[start : start + self._rows[name] * columns].reshape(-1, columns)
             for (name, columns), start in zip(COLUMNS.items(), starts.values(), strict=True)
         }
+
+
+def _copy(content: Cells, table: Cells) -> None:
+    """Write the rows of a table to another one of zeros, which has as many or more.
+
+    Zeros are not written: the rings of 10,000 links would take hundreds of megabytes before
+    anything waits there.
+    """
+    for start in range(0, len(content), _ROWS_AT_ONCE):
+        rows = content[start : start + _ROWS_AT_ONCE]
+        if rows.any():
+            table[start : start + len(rows)] = rows

@@ -151,7 +151,7 @@ def _put_on_link(
     cells[packet + LOST] = 0
     cells[packet + IP_BYTES] = size
     cells[packet + PART] = part
-    arrival_ns = transmit(now, slot, hop, cells, at)
+    arrival_ns = transmit(now, slot, hop, cells[at.hops + hop], cells, at)
     if arrival_ns in (DROPPED_AT_QUEUE, DROPPED_AT_CUT):
         dropped(now, flow, sequence, hop, drop_reason(arrival_ns), cells, at)
         return

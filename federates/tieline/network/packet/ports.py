@@ -22,6 +22,7 @@ from tieline.network.packet.memory import (
     EVENT_STREAM,
     FIRST_CLASS,
     FLOW,
+    FORK,
     FREE_AT,
     HAS_BYTES,
     HAS_JITTER,
@@ -47,11 +48,14 @@ from tieline.network.packet.memory import (
     MAX_QUEUE,
     NEXT,
     NONE,
+    ONWARD,
     OVERHEAD,
     PACKETS,
     PART,
     PEER,
     PER_BIT,
+    PORT_BITS,
+    PORT_MASK,
     PROPAGATION,
     QUANTUM,
     QUEUE,
@@ -92,18 +96,33 @@ _NS_PER_S = 1_000_000_000
 @inlined
 def plan_of(hop: int, cells: Cells, at: Layout) -> int:
     """Return where the plan of a hop begins."""
-    return at.plans + _PLAN * cells[at.hops + hop]
+    return plan_at(cells[at.hops + hop], at)
 
 
-@compiled_from_zero
-def transmit(now: int, slot: int, hop: int, cells: Cells, at: Layout) -> int:
+@inlined
+def plan_at(way: int, at: Layout) -> int:
+    """Return where the plan of an entry of `hops` begins."""
+    return at.plans + _PLAN * (way >> PORT_BITS)
+
+
+@inlined
+def port_at(way: int) -> int:
+    """Return the port of an entry of `hops`, `NO_PORT` or `FORK`."""
+    return (way & PORT_MASK) + FORK
+
+
+@inlined
+def transmit(now: int, slot: int, hop: int, way: int, cells: Cells, at: Layout) -> int:
     """Return when the packet in `slot` reaches the end of the link, or one of the above.
 
-    Whether the link loses it is decided here and takes effect at the end of the link.
+    `way` is the entry of `hops` for `hop`. Whether the link loses the packet is decided here and
+    takes effect at the end of the link.
     """
-    plan = plan_of(hop, cells, at)
-    port = at.ports + PORT_COLUMNS * cells[plan + HOP_PORT]
-    cells[at.packets + _PACKET * slot + HOP] = hop
+    plan = plan_at(way, at)
+    port = at.ports + PORT_COLUMNS * port_at(way)
+    packet = at.packets + _PACKET * slot
+    cells[packet + HOP] = hop
+    cells[packet + ONWARD] = cells[at.hops + hop + 1]
     if cells[port + SPECIAL] != 0:
         return _transmit_special(now, slot, hop, cells, at)
     service_ns = cells[plan + HOP_SERVICE]
@@ -176,6 +195,9 @@ def _queue(now: int, start_ns: int, size: int, port: int, cells: Cells, at: Layo
     while waiting > 0 and cells[ring + _RING * head] <= now:
         head = head + 1 if head + 1 < room else 0
         waiting -= 1
+    if waiting == 0:
+        # A ring that always begins anew stays in the processor's cache.
+        head = 0
     is_accepted = waiting < room
     if is_accepted:
         tail = head + waiting
