@@ -70,6 +70,20 @@ def test_what_only_compiled_code_calls_gets_no_machine_code() -> None:
     assert inner(1.0) == 2.0
 
 
+def test_what_the_wrapper_needs_is_its_own() -> None:
+    """A file with the translation alone, read first, would leave Python's caller without types."""
+
+    @compiled
+    def pair(x):
+        return x + 1.0, 2.0 * x
+
+    assert [part.tolist() for part in pair(np.array([3.0]))] == [[4.0], [6.0]]
+    (whole,), (translation,) = pair.overloads.values(), pair._inner.overloads.values()
+    assert whole.environment is not translation.environment
+    assert whole.environment.env_name != translation.environment.env_name
+    assert len(whole.environment.consts) > len(translation.environment.consts)
+
+
 def test_an_error_within_reaches_python() -> None:
     """A shape that does not fit must be told, not written past the end of an array."""
     for _ in range(2):

@@ -3,9 +3,9 @@
 numba's own cache renews a function when its own file changes, and not when a constant or a function
 that it took from another file does. Here a file's name is a hash of the function's code, of the
 code and constants of all that it calls, of the types that it was compiled for (with the names of
-their fields), and of processor, numba, llvmlite and Python. So a file is never wrong and never
-renewed: what another state of the source needs has another name, and an edit of anything else
-compiles nothing.
+their fields), of what changes numba's compiler here, and of processor, numba, llvmlite and Python.
+So a file is never wrong and never renewed: what another state of the source needs has another name,
+and an edit of anything else compiles nothing.
 """
 
 import hashlib
@@ -38,6 +38,9 @@ MOST_VERSIONS = 16
 
 SETTINGS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")
 """What numba's environment variables change about code."""
+
+MAKERS = ("indices.py", "whole_program.py")
+"""Files beside this one that change what numba makes of a function."""
 
 
 class Kernels:
@@ -97,13 +100,19 @@ class Kernels:
         return name.replace("<", "").replace(">", "")
 
     def _name(self, signature: Any, codegen: Any) -> str:
-        parts = (fingerprint(self._function), str(self._options), _told(signature))
+        parts = (fingerprint(self._function), str(self._options), _made_by(), _told(signature))
         key = "\n".join((*parts, *map(str, codegen.magic_tuple())))
         return f"{self._stem}-{hashlib.sha256(key.encode()).hexdigest()[:24]}{SUFFIX}"
 
     def _release(self, name: str) -> None:
         if name in self._locks:
             self._locks.pop(name).release()
+
+
+@cache
+def _made_by() -> str:
+    texts = b"".join(Path(__file__).with_name(name).read_bytes() for name in MAKERS)
+    return hashlib.sha256(texts).hexdigest()
 
 
 def _told(signature: Any) -> str:

@@ -9,6 +9,7 @@ and made machine code of. What is computed stays the same to the last bit.
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import copy
 from typing import Any
 
 from llvmlite.binding import Linkage
@@ -17,6 +18,7 @@ from numba.core.ccallback import CFunc
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompilerBase, CompileResult
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.environment import Environment
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.sigutils import normalize_signature
 
@@ -177,17 +179,27 @@ class _Whole(FunctionCompiler):
             library = Translation(codegen, self.py_func.__qualname__)
             library.enable_object_caching()
             library.add_linking_library(result.library)
-            context, description = result.target_context, result.fndesc
+            context, description = result.target_context, copy(result.fndesc)
+            # The wrapper's constants have a place of their own: numba takes whatever environment
+            # of a name it meets first for it, and a translation's is without them.
+            description.env_name += "_of_wrapper"
+            environment = Environment.from_fndesc(description)
             with context.push_code_library(library):
                 context.create_cpython_wrapper(
                     library,
                     description,
-                    result.environment,
+                    environment,
                     result.call_helper,
                     release_gil=self.targetoptions.get("nogil", False),
                 )
-            entry = context.get_executable(library, description, result.environment)
-        whole: CompileResult = result._replace(library=library, entry_point=entry, metadata={})
+            entry = context.get_executable(library, description, environment)
+        whole: CompileResult = result._replace(
+            library=library,
+            entry_point=entry,
+            fndesc=description,
+            environment=environment,
+            metadata={},
+        )
         for other in whole._find_referenced_environments():
             codegen.set_env(other.env_name, other)
         return whole

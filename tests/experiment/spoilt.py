@@ -25,8 +25,8 @@ def miscount(network: Any) -> None:
 
 
 def lost_statistics(network: Any) -> None:
-    """The statistics forget a packet that was sent."""
-    network._recorder._flows.sent[7] -= 1
+    """The statistics forget a frame that was sent, a packet of each flow from its PMU."""
+    network._recorder._flows._sent[0] -= 1
 
 
 def field_voltage(grid: Any) -> None:

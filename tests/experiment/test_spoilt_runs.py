@@ -31,7 +31,7 @@ SETTINGS = (
         (
             "lost statistics",
             CosimError.exit_code,
-            r"network: flow 7 has more packets ended than sent at 200000000 ns: 10 sent, -1 in fl",
+            r"network: flow 0 has more packets ended than sent at 200000000 ns: 10 sent, -1 in fl",
         ),
         (
             "field voltage",
