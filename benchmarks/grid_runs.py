@@ -54,12 +54,12 @@ class Ran:
     rows: Floats
 
 
-def simulate(system: System, seconds: int, rate: int) -> Ran:
+def simulate(system: System, seconds: int, rate: int, method: str = "rk4") -> Ran:
     """Return a run with all that an experiment records of the grid, kept in memory.
 
     The time is that of integration and recording; the system at rest is ready before.
     """
-    grid, blocks = g26_grid(system, rate), []
+    grid, blocks = g26_grid(system, rate, method=method), []
     scale = np.ones((len(SIGNALS), len(system.case.units)))
     per_row = rate // ROWS_PER_SECOND
     grid.record(per_row, SIGNALS, scale, ROWS_PER_SECOND, lambda rows: blocks.append(rows.copy()))

@@ -7,16 +7,16 @@ with all its children. A first run has an empty cache of compiled code.
 """
 
 import argparse
-import json
 import os
 import resource
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+
+from figures import Row, save
 
 RUNNER = Path(__file__).resolve().parent.parent / "runner.py"
 
@@ -58,27 +58,16 @@ def once(arguments: Sequence[str], environment: Mapping[str, str], exit_code: in
     return wall_s, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def rows(what: str, arguments: Sequence[str], samples: Sequence[Sample], reach: str) -> list[dict]:
-    """Return two rows of the table of figures: wall time and processor time."""
-    found = []
-    for figure, values in zip(("wall", "processor"), zip(*samples, strict=True), strict=True):
-        found.append(
-            {
-                "what": what,
-                "figure": f"{figure} time",
-                "unit": "s",
-                "reach": reach if figure == "wall" else "",
-                "median": round(statistics.median(values), 3),
-                "low": round(min(values), 3),
-                "high": round(max(values), 3),
-                "command": " ".join(["tieline", *arguments]),
-                "peers": "",
-            }
-        )
-    return found
+def rows(what: str, samples: Sequence[Sample], reach: float | None = None) -> list[Row]:
+    """Return two rows: wall time, which is to be at most `reach`, and processor time."""
+    walls, cpus = zip(*samples, strict=True)
+    return [
+        Row(what, "wall time", "s", walls, "at most", reach),
+        Row(what, "CPU time of all its processes", "s", cpus),
+    ]
 
 
-def measured(folder: Path, repeat: int, cold: int) -> list[dict]:
+def measured(folder: Path, repeat: int, cold: int) -> list[Row]:
     """Return every row.
 
     Args:
@@ -98,11 +87,10 @@ def measured(folder: Path, repeat: int, cold: int) -> list[dict]:
     shorts = [once((*SHORT, "--out", str(folder / f"run{i}")), environment) for i in range(repeat)]
     helps = [once(HELP, environment) for _ in range(repeat)]
     wrongs = [once(WRONG, environment, exit_code=2) for _ in range(repeat)]
-    found = rows("run of 1 s, second time", SHORT, shorts, "< 3 s")
+    found = rows("run of 1 s, second time", shorts, 3.0)
     if firsts:
-        found += rows("run of 1 s, very first, compiling", SHORT, firsts, "< 25 s")
-    found += rows("help", HELP, helps, "")
-    return found + rows("mistake in a setting", WRONG, wrongs, "")
+        found += rows("run of 1 s, very first, which compiles", firsts, 25.0)
+    return found + rows("tieline --help", helps) + rows("mistake in a setting", wrongs)
 
 
 def main() -> None:
@@ -114,11 +102,7 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         found = measured(Path(folder), options.repeat, options.cold)
-    for row in found:
-        spread = f"{row['low']:.2f} to {row['high']:.2f}"
-        print(f"{row['what']:36} {row['figure']:15} {row['median']:7.2f} s  ({spread})")
-    if options.json is not None:
-        options.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    save(found, options.json)
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ def test_an_implicit_step_ends_on_the_limit_itself(limited: System) -> None:
     assert 3 < (regulator == highest(limited)).sum() < len(regulator) - 10
 
 
-@pytest.mark.parametrize(("method", "rate"), [("rk4", 240), ("heun", 480)])
+@pytest.mark.parametrize(("method", "rate"), [("rk4", 240), ("rk3", 240), ("heun", 480)])
 def test_an_explicit_step_that_overshot_is_put_back_before_the_next(
     limited: System, method: str, rate: int
 ) -> None:

@@ -235,6 +235,7 @@ def test_a_delay_of_whole_steps_is_accepted(delay: str, method: str, rate: int) 
         ("0.101 s", "rk4", ["whole number and at least two of", "0.1 s would do"]),
         ("1 ms", "heun", ["0.00416666667 s would do"]),
         ("0.0041666667 s", "rk4", ["at least two", "0.00833333333 s would do"]),
+        ("0.0041666667 s", "rk3", ["at least two", "0.00833333333 s would do"]),
     ],
 )
 def test_a_delay_that_the_delay_line_cannot_hold_is_refused_with_the_experiment(

@@ -19,7 +19,9 @@ def swing(system: System, method: str, steps_per_second: int) -> np.ndarray:
     return grid.x
 
 
-@pytest.mark.parametrize(("method", "coarse", "order"), [("heun", 480, 2), ("rk4", 240, 4)])
+@pytest.mark.parametrize(
+    ("method", "coarse", "order"), [("heun", 480, 2), ("rk3", 240, 3), ("rk4", 240, 4)]
+)
 def test_halving_the_step_shrinks_the_error_as_the_methods_order_says(
     system: System, method: str, coarse: int, order: int
 ) -> None:
@@ -33,7 +35,8 @@ def test_halving_the_step_shrinks_the_error_as_the_methods_order_says(
 
 
 @pytest.mark.parametrize(
-    ("method", "coarse", "order"), [("heun", 480, 2), ("rk4", 240, 4), ("trapezoid", 240, 2)]
+    ("method", "coarse", "order"),
+    [("heun", 480, 2), ("rk3", 240, 3), ("rk4", 240, 4), ("trapezoid", 240, 2)],
 )
 def test_an_event_in_mid_run_costs_no_order(
     system: System, method: str, coarse: int, order: int

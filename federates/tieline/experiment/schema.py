@@ -186,13 +186,14 @@ def _engine(experiment: Experiment) -> Iterator[Problem]:
 def _delay_line(experiment: Experiment) -> Iterator[Problem]:
     """Yield why the grid's own delay line cannot hold the delay of a continuous average.
 
-    It holds the average at whole steps. The middle stages of rk4 fall between two of them and are
-    read off a cubic that reaches one step ahead, which after a delay of one step is not yet known.
+    It holds the average at whole steps. The middle stages of rk3 and rk4 fall between two of them
+    and are read off a cubic that reaches one step ahead, which after a delay of one step is not yet
+    known.
     """
     delay, grid = experiment.network.delay, experiment.grid
     if experiment.wams.reporting != "continuous" or delay is None:
         return
-    rate, least = grid.steps_per_second, 2 if grid.method == "rk4" else 1
+    rate, least = grid.steps_per_second, 2 if grid.method in ("rk3", "rk4") else 1
     steps = delay * rate
     if _is_whole(steps) and (round(steps) == 0 or round(steps) >= least):
         return

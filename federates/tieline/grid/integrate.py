@@ -1,4 +1,4 @@
-"""Fixed-step integration: Heun (order 2) and the classical Runge-Kutta method (order 4).
+"""Fixed-step integration: Heun (order 2), Kutta's method (3) and the classical Runge-Kutta one (4).
 
 Source: Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.1.
 """
@@ -35,6 +35,11 @@ class Tableau(NamedTuple):
 METHODS = {
     "heun": Tableau(
         a=np.array([[0.0, 0.0], [1.0, 0.0]]), b=np.array([0.5, 0.5]), half=np.array([0, 2])
+    ),
+    "rk3": Tableau(
+        a=np.array([[0, 0, 0], [0.5, 0, 0], [-1.0, 2.0, 0]]),
+        b=np.array([1 / 6, 2 / 3, 1 / 6]),
+        half=np.array([0, 1, 2]),
     ),
     "rk4": Tableau(
         a=np.array([[0, 0, 0, 0], [0.5, 0, 0, 0], [0, 0.5, 0, 0], [0, 0, 1.0, 0]]),

@@ -52,11 +52,11 @@ class GridSettings(_Strict):
     """Duration, integration and disturbances."""
 
     duration: Seconds = Field(41.0, gt=0, le=86_400, description="simulated time")
-    method: Literal["rk4", "heun", "trapezoid"] = Field(
+    method: Literal["rk4", "rk3", "heun", "trapezoid"] = Field(
         "rk4",
         description=(
-            "integration method; trapezoid, the implicit one, stands stiff parameters and steps as "
-            "long as 1/60 s"
+            "integration method, of order 4, 3, 2 and 2; trapezoid, the implicit one, stands stiff"
+            " parameters and steps as long as 1/60 s"
         ),
     )
     steps_per_second: PerSecond = Field(
