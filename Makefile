@@ -50,7 +50,7 @@ peers: $(PEERS)/andes/installed $(PEERS)/dpsim/installed $(PEERS)/ns3/installed
 
 $(PEERS)/andes/installed: PEER := andes
 $(PEERS)/dpsim/installed: PEER := dpsim
-$(PEERS)/ns3/installed: PEER := --editable .[ns3]
+$(PEERS)/ns3/installed: PEER := --editable .[ns3] pytest
 $(PEERS)/%/installed:
 	$(PYTHON) -m venv $(@D)
 	$(@D)/bin/python -m pip --disable-pip-version-check install --quiet $(PEER)
