@@ -64,7 +64,8 @@ from tieline.network.packet.packets import (
     enter_datagram,
     record_end,
 )
-from tieline.network.packet.ports import PORT_COLUMNS, WAITS, depart, plan_of, port_at, transmit
+from tieline.network.packet.ports import WAITS, depart, transmit
+from tieline.network.packet.ways import PORT_COLUMNS, plan_of, port_at
 
 DONE, NEEDS_ROOM, NEEDS_DRAWS = 0, 1, 2
 

@@ -34,13 +34,8 @@ from tieline.network.packet.memory import (
     Cells,
     Layout,
 )
-from tieline.network.packet.ports import (
-    DROPPED_AT_CUT,
-    DROPPED_AT_QUEUE,
-    WAITS,
-    plan_of,
-    transmit,
-)
+from tieline.network.packet.ports import DROPPED_AT_CUT, DROPPED_AT_QUEUE, WAITS, transmit
+from tieline.network.packet.ways import plan_of
 
 IP_HEADER = 20
 

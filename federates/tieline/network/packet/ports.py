@@ -22,7 +22,6 @@ from tieline.network.packet.memory import (
     EVENT_STREAM,
     FIRST_CLASS,
     FLOW,
-    FORK,
     FREE_AT,
     HAS_BYTES,
     HAS_JITTER,
@@ -37,7 +36,6 @@ from tieline.network.packet.memory import (
     HOP_CLASS,
     HOP_PORT,
     HOP_SERVICE,
-    IP_BYTES,
     IS_DOWN,
     IS_SERVING,
     JITTER_STREAM,
@@ -54,8 +52,6 @@ from tieline.network.packet.memory import (
     PART,
     PEER,
     PER_BIT,
-    PORT_BITS,
-    PORT_MASK,
     PROPAGATION,
     QUANTUM,
     QUEUE,
@@ -84,31 +80,13 @@ from tieline.network.packet.memory import (
     Layout,
 )
 from tieline.network.packet.red import is_dropped_early
+from tieline.network.packet.ways import PORT_COLUMNS, link_bytes, plan_at, plan_of, port_at
 
 DROPPED_AT_QUEUE, DROPPED_AT_CUT, WAITS = -1, -2, -3
 """In place of the instant at which a packet reaches the end of a link."""
 
-PORT_COLUMNS, _PLAN = COLUMNS["ports"], COLUMNS["plans"]
 _CLASS, _PACKET, _TAP, _RING = (COLUMNS[name] for name in ("classes", "packets", "taps", "ring"))
 _NS_PER_S = 1_000_000_000
-
-
-@inlined
-def plan_of(hop: int, cells: Cells, at: Layout) -> int:
-    """Return where the plan of a hop begins."""
-    return plan_at(cells[at.hops + hop], at)
-
-
-@inlined
-def plan_at(way: int, at: Layout) -> int:
-    """Return where the plan of an entry of `hops` begins."""
-    return at.plans + _PLAN * (way >> PORT_BITS)
-
-
-@inlined
-def port_at(way: int) -> int:
-    """Return the port of an entry of `hops`, `NO_PORT` or `FORK`."""
-    return (way & PORT_MASK) + FORK
 
 
 @inlined
@@ -153,17 +131,6 @@ def depart(now: int, number: int, cells: Cells, at: Layout) -> None:
         slot = _next_waiting(port, cells, at)
         arrival_ns = _serve(now, slot, port, cells, at)
         push_event(arrival_ns, next_order(cells, at), item_of(0, slot), cells, at)
-
-
-@compiled_from_zero
-def link_bytes(slot: int, cells: Cells, at: Layout) -> int:
-    """Return the bytes that a packet has on the link of its hop."""
-    packet = at.packets + _PACKET * slot
-    plan = plan_of(cells[packet + HOP], cells, at)
-    if cells[plan + HOP_SERVICE] != NONE:
-        return cells[plan + HOP_BYTES]
-    port = at.ports + PORT_COLUMNS * cells[plan + HOP_PORT]
-    return cells[packet + IP_BYTES] + cells[port + OVERHEAD]
 
 
 @inlined
