@@ -245,6 +245,19 @@ def test_a_guest_that_does_not_join_is_waited_for_only_while_it_works(
     assert "has not joined the federation" in str(suspect)
 
 
+def test_waiting_for_others_to_join_is_no_work() -> None:
+    """If not, the processor time of HELICS's own looking around would hold a start for 30 s."""
+    watch = watch_of(word("grid", "joining", k=-1), word("network", "opening", k=-1))
+    looking, idle = FakeProcess(works=True), FakeProcess(works=False)
+    everyone = {"broker": idle, "grid": looking, "network": idle}
+    suspect = None
+    for _ in range(25):
+        watch.pass_time(0.1)
+        looking.passed_s += 0.1
+        suspect = suspect or watch.suspect(everyone)
+    assert named(suspect) == "network"
+
+
 def test_a_stopped_process_is_named_before_the_limit_of_a_long_run() -> None:
     """If not, a run with long meetings would wait for a process that cannot work."""
     watch = Watch(FederationSettings(hang_timeout=60.0))

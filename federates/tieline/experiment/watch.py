@@ -19,7 +19,7 @@ LONG_S = 600.0
 """The same, where a federate may rightly work for long before there is a meeting to learn from."""
 
 _FIRST_LOOK = 0.4
-_WORKING_SHARE = 0.03
+_WORKING_SHARE = 0.05
 _LONGEST_PASS_S = 0.5
 _LEAST_CPU_S = 0.05
 _DONE = ("finished", "failed")
@@ -198,7 +198,9 @@ class Watch:
         known = {name for name in alive | before.keys() if name in done}
         unknown = (alive | before.keys()) - known
         guests = set(self._guests)
-        self._works_on = _works(done, known - guests, unknown - guests, elapsed_s)
+        # Whoever waits in HELICS for the others to join looks around all the time, and works not.
+        waiting = set() if self.is_running() else {n for n in known if self._has_joined(n)}
+        self._works_on = _works(done, known - guests - waiting, unknown - guests, elapsed_s)
         self._guests_work = _works(done, known & guests, unknown & guests, elapsed_s)
         self._efforts = (self.silence_s, now)
 
@@ -297,6 +299,9 @@ class Watch:
         if self.is_running():
             return all(word.get("waits") for word in words)
         return all(word.get("state") == "joining" for word in words)
+
+    def _has_joined(self, name: str) -> bool:
+        return all(self._state(member) == "joining" for member in self._whose(name))
 
     def _has_failed(self, name: str) -> bool:
         return any(self._state(member) == "failed" for member in self._whose(name))
