@@ -200,8 +200,8 @@ class Watch:
         guests = set(self._guests)
         # Whoever waits in HELICS for the others to join looks around all the time, and works not.
         waiting = set() if self.is_running() else {n for n in known if self._has_joined(n)}
-        self._works_on = _works(done, known - guests - waiting, unknown - guests, elapsed_s)
-        self._guests_work = _works(done, known & guests, unknown & guests, elapsed_s)
+        self._works_on = _have_worked(done, known - guests - waiting, unknown - guests, elapsed_s)
+        self._guests_work = _have_worked(done, known & guests, unknown & guests, elapsed_s)
         self._efforts = (self.silence_s, now)
 
     def _works(self, name: str, message: Mapping[str, Any]) -> bool:
@@ -331,7 +331,7 @@ def _place(message: Mapping[str, Any]) -> tuple[Any, Any]:
     return message.get("state"), message.get("k")
 
 
-def _works(
+def _have_worked(
     done: Mapping[str, Effort], known: set[str], unknown: set[str], elapsed_s: float
 ) -> bool | None:
     """Return whether processes have worked; None if one that is not known of may have."""

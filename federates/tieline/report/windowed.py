@@ -37,7 +37,7 @@ class Windowed:
         self.keys = list(numbers)
         instants = [at_s for at_s, _ in found]
         self.windows = np.unique(np.concatenate([np.zeros(0), *instants]))
-        self._keys = [keys for _, keys in found]
+        self._keys = [rows for _, rows in found]
         self._at = [np.searchsorted(self.windows, at_s).astype(np.int32) for at_s in instants]
 
     def matrix(
