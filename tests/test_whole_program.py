@@ -4,6 +4,7 @@ import numba
 import numpy as np
 import pytest
 from numba import types
+from numba.core.caching import NullCache
 
 from tieline.compiled import IS_ON, compiled, compiled_from_zero, first_class
 
@@ -77,6 +78,7 @@ def test_what_the_wrapper_needs_is_its_own() -> None:
     def pair(x):
         return x + 1.0, 2.0 * x
 
+    pair._cache = NullCache()  # a kept file would leave nothing to translate
     assert [part.tolist() for part in pair(np.array([3.0]))] == [[4.0], [6.0]]
     (whole,), (translation,) = pair.overloads.values(), pair._inner.overloads.values()
     assert whole.environment is not translation.environment
