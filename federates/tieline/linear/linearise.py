@@ -93,13 +93,17 @@ class LinearSystem:
         """Return (n, n) the state matrix with the average undelayed."""
         average = self.average_weights @ self.average_rows
         members = np.flatnonzero(average)
-        A = self.A_without_average.copy()
+        A = self._assembled()
         A[:, members] += np.outer(self.by_average, average[members])
         return A
 
     @cached_property
     def A_without_average(self) -> Floats:
         """Return (n, n) the state matrix when every stabiliser believes a constant average."""
+        return self._assembled()
+
+    def _assembled(self) -> Floats:
+        """Return the matrix anew: a copy of one that is kept would cost more, and its memory."""
         A = np.zeros((len(self.states), len(self.states)))
         _assemble(self.blocks, *self._with_stabilisers, self._felt, self._block_voltages, A)
         return A
