@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from tieline.experiment.results import Run
-from tieline.figures import COLOURS, PANEL_INCHES, STYLE, save
+from tieline.figures import COLOURS, PANEL_INCHES, STYLE, PanelFigure, save
 
 WITHOUT_PACKETS = "black"
 MOST_BARS = 80
@@ -104,8 +104,8 @@ def delay_histograms(runs: Sequence[Run]) -> Figure:
     columns = min(3, math.ceil(math.sqrt(len(sent))))
     rows = -(-len(sent) // columns)
     size = (PANEL_INCHES[0] if columns == 1 else 2.6 * columns, 2.4 * rows + 0.4)
-    figure = Figure(figsize=size, layout="constrained")
-    grid = figure.subplots(rows, columns, squeeze=False).ravel()
+    figure = PanelFigure(size, rows, columns)
+    grid = figure.axes
     for axes, (run, look) in zip(grid, sent, strict=False):
         _histogram(axes, run, look["color"])
     for axes in grid[len(sent) :]:
@@ -118,14 +118,16 @@ def delay_histograms(runs: Sequence[Run]) -> Figure:
 def overview(runs: Sequence[Run]) -> Figure:
     """Return frequency, voltage and delays in one figure."""
     has_delays = any(len(_counts(run)) for run in runs)
-    figure = Figure(figsize=(6.3, 6.6 if has_delays else 4.8), layout="constrained")
-    panels = figure.subplots(3 if has_delays else 2, 1)
+    rows = 3 if has_delays else 2
+    figure = PanelFigure((PANEL_INCHES[0], 6.6 if has_delays else 4.8), rows)
+    panels = figure.axes
     frequency(panels[0], runs)
     voltage(panels[1], runs)
     panels[0].set_ylabel("system frequency, Hz")
     panels[1].set_ylabel(panels[1].get_ylabel().replace("terminal voltage of ", "voltage of "))
-    if panels[1].get_legend():
-        panels[1].get_legend().remove()
+    legend = panels[1].get_legend()
+    if legend is not None:
+        legend.remove()
     if has_delays:
         delay_shares(panels[2], runs)
     for letter, axes in zip("abc", panels, strict=False):
@@ -154,8 +156,8 @@ def believing_unit(run: Run) -> str | None:
 
 
 def _alone(panel: Callable[[Axes, Sequence[Run]], None], runs: Sequence[Run]) -> Figure:
-    figure = Figure(figsize=PANEL_INCHES, layout="constrained")
-    panel(figure.subplots(), runs)
+    figure = PanelFigure(PANEL_INCHES)
+    panel(figure.axes[0], runs)
     return figure
 
 
