@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from tieline.figures.scales import POINTS_PER_INCH
 
 
+_HAIRLINE_POINTS = 0.3
+
+
 class Both(RendererBase):
     """Hands everything that is drawn to a renderer of SVG and to one of pixels.
 
@@ -95,6 +98,36 @@ class Both(RendererBase):
             offset_trans + self._to_dots,
             *looks,
             **more,
+        )
+
+    def draw_quad_mesh(
+        self,
+        gc: GraphicsContextBase,
+        master_transform: Transform,
+        meshWidth: Any,
+        meshHeight: Any,
+        coordinates: Any,
+        offsets: Any,
+        offsetTrans: Transform,
+        facecolors: Any,
+        antialiased: Any,
+        edgecolors: Any,
+    ) -> None:
+        """Draw a mesh of coloured cells."""
+        mesh = (meshWidth, meshHeight, coordinates, offsets)
+        # Between cells without edges a viewer of SVG would show the paper.
+        edged = self.new_gc()
+        edged.copy_properties(gc)
+        edged.set_linewidth(max(_HAIRLINE_POINTS, gc.get_linewidth()))
+        looks = (facecolors, antialiased)
+        self._vector.draw_quad_mesh(edged, master_transform, *mesh, offsetTrans, *looks, None)
+        self._raster.draw_quad_mesh(
+            self._in_dots(gc),
+            master_transform + self._to_dots,
+            *mesh,
+            offsetTrans + self._to_dots,
+            *looks,
+            edgecolors,
         )
 
     def draw_image(
