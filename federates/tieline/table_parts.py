@@ -18,10 +18,3 @@ def parts(path: Path, columns: Sequence[str]) -> Iterator[pa.Table]:
     with pq.ParquetFile(path) as table:
         for group in range(table.num_row_groups):
             yield table.read_row_group(group, list(columns), use_threads=False)
-
-
-def row_count(path: Path) -> int:
-    """Return how many rows a table has."""
-    if path.suffix != ".parquet":
-        return int(read_whole(path, []).num_rows)
-    return int(pq.read_metadata(path).num_rows)

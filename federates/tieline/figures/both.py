@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from tieline.figures.scales import POINTS_PER_INCH
 
-
 _HAIRLINE_POINTS = 0.3
 
 

@@ -6,6 +6,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from tieline.columns import values_of
 from tieline.errors import InputError
 from tieline.figures import PANEL_INCHES, STYLE, PanelFigure, colours, save
 from tieline.report.packing import thinned
@@ -54,7 +55,7 @@ def has_series(folder: Path) -> bool:
     """Return whether a run's folder holds the series that `draw` needs, with any packet in them."""
     paths = [folder / f"{name}.parquet" for name in ("controller_series", "link_series")]
     return all(path.is_file() for path in paths) and any(
-        part.column("delivered").to_numpy().any() for part in parts(paths[0], ["delivered"])
+        values_of(part.column("delivered")).any() for part in parts(paths[0], ["delivered"])
     )
 
 

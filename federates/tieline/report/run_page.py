@@ -29,7 +29,7 @@ def write_run_page(run: Run, sweep: str | None = None) -> Path:
     """
     store = Store()
     drawn = None
-    if run.columns("grid") and len(run.table("grid", "t_s")):
+    if run.columns("grid") and len(run.arrays("grid", "t_s")["t_s"]):
         put_grid(store, run)
         put_traffic(store, run)
         drawn = drawing(store, run)
@@ -54,8 +54,8 @@ def write_run_page(run: Run, sweep: str | None = None) -> Path:
     if grid:
         drawn_there = charts([chart.name for chart in grid])
         sections.append(("curves", "Grid and controllers", Html(note(ROUNDING) + drawn_there)))
-    tables = links_table(run.table("links")) + controllers_table(
-        run.table("flows"), run.table("ages")
+    tables = links_table(run.arrays("links")) + controllers_table(
+        run.arrays("flows"), run.arrays("ages")
     )
     drawn_there = charts([chart.name for chart in network])
     sections.append(("network", "Network", Html(drawn_there + tables)))

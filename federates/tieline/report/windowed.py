@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from tieline.columns import values_of
 from tieline.table_parts import parts
 
 Floats = NDArray[np.float64]
@@ -66,14 +67,14 @@ class Windowed:
         for part, keys, at in zip(self._parts(column), self._keys, self._at, strict=True):
             rows = row_of[keys]
             here = rows >= 0
-            values[rows[here], own[at[here]]] = part.column(column).to_numpy()[here]
+            values[rows[here], own[at[here]]] = values_of(part.column(column))[here]
         return values
 
     def totals(self, column: str) -> Floats:
         """Return the sum (n,) of a quantity over all windows, for each key."""
         sums = np.zeros(len(self.keys))
         for part, keys in zip(self._parts(column), self._keys, strict=True):
-            sums += np.bincount(keys, part.column(column).to_numpy(), len(sums))
+            sums += np.bincount(keys, values_of(part.column(column)), len(sums))
         return sums
 
     def _parts(self, *columns: str) -> Iterator[pa.Table]:
@@ -82,7 +83,7 @@ class Windowed:
 
 
 def _instants(part: pa.Table) -> Floats:
-    return np.asarray(part.column("t_s").to_numpy(), np.float64)
+    return np.asarray(values_of(part.column("t_s")), np.float64)
 
 
 def _numbered(part: pa.Table, keys: Sequence[str], numbers: dict[tuple[str, ...], int]) -> Integers:
@@ -90,7 +91,7 @@ def _numbered(part: pa.Table, keys: Sequence[str], numbers: dict[tuple[str, ...]
     encoded = [part.column(key).combine_chunks().dictionary_encode() for key in keys]
     texts = [one.dictionary.to_pylist() for one in encoded]
     shape = tuple(max(1, len(text)) for text in texts)
-    codes = np.ravel_multi_index([one.indices.to_numpy() for one in encoded], shape)
+    codes = np.ravel_multi_index([values_of(one.indices) for one in encoded], shape)
     distinct, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
     number_of = np.zeros(len(distinct), np.int32)
     for which in np.argsort(first):
