@@ -41,6 +41,7 @@ class _Scale(Axis):
         self.offsetText.set_text(self.get_major_formatter().get_offset())
         length = self.dots(self.get_tick_padding())
         self.reach = max([length, *(self._outwards(box) for box in boxes)])
+        self._place()
         return boxes
 
     def thickness(self, renderer: RendererBase) -> float:
