@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tieline.columns import read_blocks, read_columns, values_of
+from tieline.columns import TableFile, Tables, values_of
 
 VALUES = {
     pa.float64(): st.floats(allow_nan=False) | st.none(),
@@ -42,8 +42,26 @@ def test_blocks_hold_every_column_once_and_few_values(tmp_path: Path, rows: int)
     names = [f"vt_pu.G{i}" for i in range(3)]
     table = {name: np.full(rows, float(i)) for i, name in enumerate(names)}
     pq.write_table(pa.table(table), tmp_path / "a.parquet")
-    blocks = list(read_blocks(tmp_path / "a.parquet", names))
+    with TableFile(tmp_path / "a.parquet") as file:
+        blocks = list(file.blocks(names))
+        whole = file.read()
     assert [name for block in blocks for name in block] == names
     assert len(blocks) == (1 if rows == 2 else 3)
-    whole = read_columns(tmp_path / "a.parquet")
     assert all(np.array_equal(whole[name], table[name]) for name in names)
+
+
+def test_a_table_that_is_kept_open_is_closed_in_the_end(tmp_path: Path) -> None:
+    """Otherwise the report of a large sweep would run out of files that may be open."""
+    pq.write_table(pa.table({"t_s": [0.0, 1.0]}), tmp_path / "grid.parquet")
+    tables = Tables(tmp_path)
+    with tables.kept_open():
+        with tables.kept_open(), tables.opened("grid") as first:
+            pass
+        with tables.opened("grid") as again, tables.opened("flows") as missing:
+            assert again is first
+            assert missing is None
+            assert again.read(["t_s"])["t_s"].tolist() == [0.0, 1.0]
+    with tables.opened("grid") as later:
+        assert later is not first
+    with pytest.raises(ValueError, match="closed"):
+        first.read()

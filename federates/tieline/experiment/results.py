@@ -1,6 +1,7 @@
 """Reads result folders: a run, or a sweep of runs; knows nothing of how they were made."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -8,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tieline.columns import Columns, read_blocks, read_columns
+from tieline.columns import Columns, Tables
 from tieline.experiment.folder import FORMAT, MANIFEST, is_result, read_json, read_manifest
 from tieline.experiment.table_hash import table_hash
-from tieline.tables import column_names, read_table, stored
+from tieline.tables import read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -74,7 +75,7 @@ class Run:
 
     def path(self, name: str) -> Path | None:
         """Return the file of a table; None if it was not written."""
-        return stored(self.folder / f"{name}.parquet")
+        return self._tables.path(name)
 
     def table(self, name: str, *columns: str) -> "pd.DataFrame":
         """Return a table (`grid`, `flows`, ...), or some columns; no rows if it was not written."""
@@ -87,21 +88,18 @@ class Run:
 
     def arrays(self, name: str, *columns: str) -> Columns:
         """Return a table, or some columns, as arrays (rows,); nothing if it was not written."""
-        path = self.path(name)
-        return {} if path is None else read_columns(path, columns or None)
+        with self._tables.opened(name) as table:
+            return {} if table is None else table.read(columns or None)
 
     def blocks(self, name: str, columns: Sequence[str]) -> Iterator[Columns]:
         """Yield some columns of a table that was written, as many at a time as are a few MB."""
-        path = self.path(name)
-        if path is not None and columns:
-            yield from read_blocks(path, columns)
+        with self._tables.opened(name) as table:
+            if table is not None:
+                yield from table.blocks(columns)
 
     def columns(self, name: str) -> list[str]:
         """Return the names of a table's columns; none if it was not written."""
-        if name not in self._names:
-            path = self.path(name)
-            self._names[name] = [] if path is None else column_names(path)
-        return self._names[name]
+        return self._tables.names(name)
 
     def events(self) -> list[tuple[float, str]]:
         """Return (instant in s, what happens) of each event, in order of time."""
@@ -125,10 +123,13 @@ class Run:
         filled = np.flatnonzero(counts["count"])
         return {name: values[filled[0] : filled[-1] + 1] for name, values in counts.items()}
 
+    def kept_open(self) -> AbstractContextManager[None]:
+        """Open each table once for all that is read of it within a `with`."""
+        return self._tables.kept_open()
+
     @cached_property
-    def _names(self) -> dict[str, list[str]]:
-        """The columns of the tables that were asked for: the wide ones take long to tell them."""
-        return {}
+    def _tables(self) -> Tables:
+        return Tables(self.folder)
 
     @cached_property
     def _log(self) -> list[tuple[float, str, bool]]:

@@ -30,6 +30,11 @@ def summarise(run: Run) -> dict[str, Any]:
     Raises:
         InputError: the run's files cannot be read.
     """
+    with run.kept_open():
+        return _summary(run)
+
+
+def _summary(run: Run) -> dict[str, Any]:
     # Never all of its columns at once: those of a long run take more memory than the run itself.
     grid = run.arrays("grid", "t_s", "coi_pu")
     told = run.told()

@@ -6,12 +6,11 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from tieline.columns import values_of
+from tieline.columns import TableFile, values_of
 from tieline.errors import InputError
 from tieline.figures import PANEL_INCHES, STYLE, PanelFigure, colours, save
 from tieline.report.packing import thinned
 from tieline.report.windowed import Floats, Windowed
-from tieline.table_parts import parts
 
 PANELS = 3
 LINKS = 4
@@ -54,9 +53,11 @@ def network_plots(folder: Path) -> list[Path]:
 def has_series(folder: Path) -> bool:
     """Return whether a run's folder holds the series that `draw` needs, with any packet in them."""
     paths = [folder / f"{name}.parquet" for name in ("controller_series", "link_series")]
-    return all(path.is_file() for path in paths) and any(
-        values_of(part.column("delivered")).any() for part in parts(paths[0], ["delivered"])
-    )
+    if not all(path.is_file() for path in paths):
+        return False
+    with TableFile(paths[0]) as table:
+        delivered = table.parts(["delivered"])
+        return any(values_of(part.column("delivered")).any() for part in delivered)
 
 
 def controller_delays(series: Windowed) -> Figure:

@@ -27,6 +27,11 @@ def write_run_page(run: Run, sweep: str | None = None) -> Path:
         run: complete, or as far as it came; without a grid the page has no curves.
         sweep: the page of the sweep that it is a point of, as seen from its folder.
     """
+    with run.kept_open():
+        return _written(run, sweep)
+
+
+def _written(run: Run, sweep: str | None) -> Path:
     store = Store()
     drawn = None
     if run.columns("grid") and len(run.arrays("grid", "t_s")["t_s"]):

@@ -1,7 +1,7 @@
 """Gathers what the scripts of a page draw: curves over common axes, and charts of them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -86,7 +86,10 @@ class Store:
 
     def data(self) -> dict[str, Any]:
         """Return all of it as plain data."""
-        charts = [asdict(chart) for chart in self.charts]
+        charts = [
+            vars(chart) | {"curves": [vars(curve) for curve in chart.curves]}
+            for chart in self.charts
+        ]
         return {"axes": self.axes, "tables": self.tables, "charts": charts}
 
 

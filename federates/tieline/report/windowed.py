@@ -11,8 +11,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from tieline.columns import values_of
-from tieline.table_parts import parts
+from tieline.columns import TableFile, values_of
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int32]
@@ -20,6 +19,8 @@ Integers = NDArray[np.int32]
 
 class Windowed:
     """A table with an instant `t_s` and keys in each row, one quantity of which is read at a time.
+
+    It stays open as long as it is used.
 
     Args:
         path: the table; None is one without rows.
@@ -31,7 +32,7 @@ class Windowed:
     """
 
     def __init__(self, path: Path | None, *keys: str) -> None:
-        self._path = path
+        self._table = None if path is None else TableFile(path)
         self.keys: list[tuple[str, ...]] = []
         numbers: dict[tuple[str, ...], int] = {}
         found = [(_instants(part), _numbered(part, keys, numbers)) for part in self._parts(*keys)]
@@ -78,8 +79,8 @@ class Windowed:
         return sums
 
     def _parts(self, *columns: str) -> Iterator[pa.Table]:
-        if self._path is not None:
-            yield from parts(self._path, ("t_s", *columns))
+        if self._table is not None:
+            yield from self._table.parts(("t_s", *columns))
 
 
 def _instants(part: pa.Table) -> Floats:
