@@ -16,6 +16,9 @@ Floats = NDArray[np.float64]
 
 _PAD_POINTS = 3.0
 """Around all that is drawn, and around each panel with its labels."""
+_FIRST_GUESS = {"left": 0.1, "right": 0.98, "bottom": 0.1, "top": 0.95}
+"""Of the figure's size: where panels stand before their labels are measured."""
+
 _MOST_INTERVALS = 9
 """Between ticks; a scale has no more, however long it is."""
 
@@ -91,6 +94,7 @@ class PanelFigure(Figure):
     ) -> None:
         super().__init__(figsize=size_inches)
         self._rows, self._columns = rows, columns
+        self.subplots_adjust(**_FIRST_GUESS)
         self.subplots(rows, columns, squeeze=False, subplot_kw={"axes_class": Panel}, **shared)
 
     def draw(self, renderer: RendererBase) -> None:

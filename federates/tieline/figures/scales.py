@@ -73,8 +73,14 @@ class _Scale(Axis):
             text.draw(renderer)
         renderer.close_group(self.__name__)
 
+    def set_tick_params(self, *args: Any, **looks: Any) -> None:
+        """Note how ticks shall look; they are made when they are drawn, and some never are."""
+        vars(self).update(majorTicks=[], minorTicks=[])
+        super().set_tick_params(*args, **looks)
+        self.reset_ticks()
+
     def set_clip_path(self, path: Any, transform: Any = None) -> None:
-        """Clip nothing: all lines end at the panel, and a tick is made when it is needed."""
+        """Clip nothing: all lines end at the panel, and no tick is made for it."""
 
     def _groups(self) -> Groups:
         """Yield a tick with the places (n,) to draw it at, and what stands there."""
