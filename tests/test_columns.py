@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tieline.columns import TableFile, Tables, values_of
+from tieline.batches import values_of
+from tieline.columns import TableFile, Tables
 
 VALUES = {
     pa.float64(): st.floats(allow_nan=False) | st.none(),

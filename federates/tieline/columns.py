@@ -5,40 +5,16 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
-import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from tieline.batches import values_of
 from tieline.tables import column_names, read_whole, stored
 
 Columns = dict[str, NDArray[Any]]
-"""The values (rows,) of some columns by their names; texts are objects."""
+"""The values (rows,) of some columns by their names: NaN for null, and texts as objects."""
 
 _VALUES_AT_ONCE = 300_000
-
-
-def values_of(column: Any) -> NDArray[Any]:
-    """Return the values of an Arrow array, or of one in chunks.
-
-    Null is NaN, which makes floats of integers, and None among texts.
-    """
-    if isinstance(column, pa.ChunkedArray):
-        parts = [values_of(chunk) for chunk in column.chunks]
-        # Without any chunk there is still a type.
-        return np.concatenate(parts or [values_of(pa.nulls(0, column.type))])
-    kind = column.type
-    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
-        return np.array(column.to_pylist(), bool if pa.types.is_boolean(kind) else object)
-    rows = slice(column.offset, column.offset + len(column))
-    is_valid, data = column.buffers()
-    if data is None:
-        return np.zeros(0, kind.to_pandas_dtype())
-    values = np.frombuffer(data, kind.to_pandas_dtype())[rows]
-    if not column.null_count:
-        return values
-    bits = np.unpackbits(np.frombuffer(is_valid, np.uint8), bitorder="little")[rows]
-    return np.where(bits, values, values.dtype.type(np.nan) if values.dtype.kind == "f" else np.nan)
 
 
 class TableFile:

@@ -48,7 +48,7 @@ def _figures(runs: Sequence[Run]) -> dict[str, Figure]:
 def frequency(axes: Axes, runs: Sequence[Run]) -> None:
     """Draw the frequency of the centre of inertia against time, one curve a run."""
     for run, look in zip(runs, _looks(runs), strict=True):
-        grid = run.arrays("grid", "t_s", "coi_pu")
+        grid = run.values("grid", "t_s", "coi_pu")
         nominal_hz = float(run.told()["frequency_hz"])
         axes.plot(grid["t_s"], nominal_hz * grid["coi_pu"], label=run.label, **look)
     _finish(axes, runs, "system frequency (centre of inertia), Hz")
@@ -59,7 +59,7 @@ def voltage(axes: Axes, runs: Sequence[Run]) -> None:
     """Draw the terminal voltage of one unit against time, one curve a run."""
     unit = drawn_unit(runs[0])
     for run, look in zip(runs, _looks(runs), strict=True):
-        grid = run.arrays("grid", "t_s", f"vt_pu.{unit}")
+        grid = run.values("grid", "t_s", f"vt_pu.{unit}")
         axes.plot(grid["t_s"], grid[f"vt_pu.{unit}"], label=run.label, **look)
     _finish(axes, runs, f"terminal voltage of {unit}, pu")
 
@@ -83,7 +83,7 @@ def believed_average(axes: Axes, runs: Sequence[Run]) -> None:
     run = runs[0]
     nominal_hz = float(run.told()["frequency_hz"])
     unit = believing_unit(run)
-    grid = run.arrays("grid", "t_s", "coi_pu", f"wbar_pu.{unit}")
+    grid = run.values("grid", "t_s", "coi_pu", f"wbar_pu.{unit}")
     start_s = min((at for at, _ in run.events()), default=0.0)
     before_s, after_s = BELIEF_WINDOW_S
     inside = (grid["t_s"] >= start_s - before_s) & (grid["t_s"] <= start_s + after_s)

@@ -86,7 +86,7 @@ class Run:
 
         return pd.DataFrame()
 
-    def arrays(self, name: str, *columns: str) -> Columns:
+    def values(self, name: str, *columns: str) -> Columns:
         """Return a table, or some columns, as arrays (rows,); nothing if it was not written."""
         with self._tables.opened(name) as table:
             return {} if table is None else table.read(columns or None)
@@ -117,7 +117,7 @@ class Run:
     @cached_property
     def delays(self) -> Columns:
         """The histogram of the delays between first and last arrivals; nothing without arrivals."""
-        counts = self.arrays("delays")
+        counts = self.values("delays")
         if not counts or not counts["count"].any():
             return {}
         filled = np.flatnonzero(counts["count"])
@@ -134,7 +134,7 @@ class Run:
     @cached_property
     def _log(self) -> list[tuple[float, str, bool]]:
         """Instant in s, what happens, and whether the run ends with it."""
-        log = self.arrays("events")
+        log = self.values("events")
         if not log:
             return []
         rows = zip(log["t_s"], log["what"], log["is_ending"], strict=True)

@@ -36,7 +36,7 @@ def summarise(run: Run) -> dict[str, Any]:
 
 def _summary(run: Run) -> dict[str, Any]:
     # Never all of its columns at once: those of a long run take more memory than the run itself.
-    grid = run.arrays("grid", "t_s", "coi_pu")
+    grid = run.values("grid", "t_s", "coi_pu")
     told = run.told()
     return {
         "label": run.label,
@@ -44,7 +44,7 @@ def _summary(run: Run) -> dict[str, Any]:
         "frequency": _frequency(run, grid, float(told["frequency_hz"])),
         "swing": _swing(run, grid, told.get("tie_mode")),
         "delay": _delay(run),
-        "packets": _packets(run.arrays("flows")),
+        "packets": _packets(run.values("flows")),
         "age": _age(run),
         "lowest_voltage": _lowest_voltage(run),
         "times": run.manifest.get("times", {}),
@@ -117,7 +117,7 @@ def _mean_speed(run: Run, units: list[str]) -> NDArray[np.float64]:
 
 def _delay(run: Run) -> dict[str, Any]:
     """Combined delay over every delivered packet; the setting where no packets are sent."""
-    flows, counts = run.arrays("flows"), run.arrays("delays")
+    flows, counts = run.values("flows"), run.values("delays")
     network = run.config["network"]
     if run.config["wams"]["reporting"] == "continuous":
         delay_s = float(network["delay"] or 0.0)
@@ -185,7 +185,7 @@ def _lowest_voltage(run: Run) -> dict[str, Any] | None:
         for name, values in block.items()
     }
     column = min(lowest, key=lambda name: lowest[name])
-    of_it = run.arrays("grid", "t_s", column)
+    of_it = run.values("grid", "t_s", column)
     row = int(np.nanargmin(_values(of_it, column)))
     return {
         "unit": column.removeprefix(prefix),

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from tieline.columns import values_of
+from tieline.batches import values_of
 from tieline.tables import read_whole
 
 Parts = Iterable[pa.ChunkedArray]

@@ -15,7 +15,7 @@ LATER = "Hidden at first: {}, which the disturbance trips and which goes on alon
 
 def put_grid(store: Store, run: Run) -> None:
     """Add what `grid.parquet` of a run holds to a page."""
-    grid, interconnection = run.arrays("grid", "t_s", "coi_pu"), run.map()
+    grid, interconnection = run.values("grid", "t_s", "coi_pu"), run.map()
     time_s = grid["t_s"]
     nominal_hz = float(run.told()["frequency_hz"])
     unit_areas, bus_areas = areas_of(interconnection)

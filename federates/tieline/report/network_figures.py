@@ -6,7 +6,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from tieline.columns import TableFile, values_of
+from tieline.batches import values_of
+from tieline.columns import TableFile
 from tieline.errors import InputError
 from tieline.figures import PANEL_INCHES, STYLE, PanelFigure, colours, save
 from tieline.report.packing import thinned

@@ -34,7 +34,7 @@ def write_run_page(run: Run, sweep: str | None = None) -> Path:
 def _written(run: Run, sweep: str | None) -> Path:
     store = Store()
     drawn = None
-    if run.columns("grid") and len(run.arrays("grid", "t_s")["t_s"]):
+    if run.columns("grid") and len(run.values("grid", "t_s")["t_s"]):
         put_grid(store, run)
         put_traffic(store, run)
         drawn = drawing(store, run)
@@ -59,8 +59,8 @@ def _written(run: Run, sweep: str | None) -> Path:
     if grid:
         drawn_there = charts([chart.name for chart in grid])
         sections.append(("curves", "Grid and controllers", Html(note(ROUNDING) + drawn_there)))
-    tables = links_table(run.arrays("links")) + controllers_table(
-        run.arrays("flows"), run.arrays("ages")
+    tables = links_table(run.values("links")) + controllers_table(
+        run.values("flows"), run.values("ages")
     )
     drawn_there = charts([chart.name for chart in network])
     sections.append(("network", "Network", Html(drawn_there + tables)))

@@ -94,7 +94,7 @@ def _grid(run: Run, unit: str | None) -> Columns:
     quantities = ("speed_pu", "vt_pu", "wbar_pu", "vs_pu")
     wanted = {"t_s", "coi_pu", *(f"{quantity}.{unit}" for quantity in quantities)}
     names = [n for n in run.columns("grid") if n in wanted or n.startswith("age_s.")]
-    return run.arrays("grid", *names)
+    return run.values("grid", *names)
 
 
 def _put(

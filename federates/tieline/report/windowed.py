@@ -11,7 +11,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from tieline.columns import TableFile, values_of
+from tieline.batches import values_of
+from tieline.columns import TableFile
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int32]
@@ -92,7 +93,9 @@ def _numbered(part: pa.Table, keys: Sequence[str], numbers: dict[tuple[str, ...]
     encoded = [part.column(key).combine_chunks().dictionary_encode() for key in keys]
     texts = [one.dictionary.to_pylist() for one in encoded]
     shape = tuple(max(1, len(text)) for text in texts)
-    codes = np.ravel_multi_index([values_of(one.indices) for one in encoded], shape)
+    codes = np.ravel_multi_index(
+        [values_of(pa.chunked_array([one.indices])) for one in encoded], shape
+    )
     distinct, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
     number_of = np.zeros(len(distinct), np.int32)
     for which in np.argsort(first):
