@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -15,8 +15,14 @@ from tieline.columns import Columns
 from tieline.experiment.results import Run
 from tieline.figures import COLOURS, PANEL_INCHES, STYLE, PanelFigure, save
 
+T = TypeVar("T")
+
 WITHOUT_PACKETS = "black"
 MOST_BARS = 80
+MOST_NAMES = 12
+"""In a legend; where there are more runs, colours in between tell enough."""
+MOST_HISTOGRAMS = 24
+"""In one figure; more could not be looked at."""
 
 BELIEF_WINDOW_S = (1.0, 11.0)
 """Before and after the first event, where a late average differs from the true one."""
@@ -102,16 +108,18 @@ def believed_average(axes: Axes, runs: Sequence[Run]) -> None:
 def delay_histograms(runs: Sequence[Run]) -> Figure:
     """Return a figure with one histogram of the combined delays for each run that sent packets."""
     sent = [(run, look) for run, look in zip(runs, _looks(runs), strict=True) if run.delays]
-    columns = min(3, math.ceil(math.sqrt(len(sent))))
-    rows = -(-len(sent) // columns)
+    shown = _spread(sent, MOST_HISTOGRAMS)
+    columns = min(3, math.ceil(math.sqrt(len(shown))))
+    rows = -(-len(shown) // columns)
     size = (PANEL_INCHES[0] if columns == 1 else 2.6 * columns, 2.4 * rows + 0.4)
     figure = PanelFigure(size, rows, columns)
     grid = figure.axes
-    for axes, (run, look) in zip(grid, sent, strict=False):
+    for axes, (run, look) in zip(grid, shown, strict=False):
         _histogram(axes, run, look["color"])
-    for axes in grid[len(sent) :]:
+    for axes in grid[len(shown) :]:
         axes.remove()
-    figure.supxlabel("combined delay, ms", fontsize=9.0)
+    which = f" ({len(shown)} of {len(sent)} runs)" if len(shown) < len(sent) else ""
+    figure.supxlabel(f"combined delay, ms{which}", fontsize=9.0)
     figure.supylabel("frames, % per ms", fontsize=9.0)
     return figure
 
@@ -173,7 +181,15 @@ def _finish(axes: Axes, runs: Sequence[Run], what: str) -> None:
     axes.margins(x=0)
     axes.ticklabel_format(useOffset=False)
     if len(runs) > 1:
-        axes.legend(title=_legend_title(runs), title_fontsize=8.0, ncols=2)
+        named = _spread(axes.get_legend_handles_labels()[0], MOST_NAMES)
+        axes.legend(handles=named, title=_legend_title(runs), title_fontsize=8.0, ncols=2)
+
+
+def _spread(items: Sequence[T], most: int) -> Sequence[T]:
+    """Return the first and the last and what is evenly between, `most` in all; all if fewer."""
+    if len(items) <= most:
+        return items
+    return [items[round(i * (len(items) - 1) / (most - 1))] for i in range(most)]
 
 
 def _mark_events(axes: Axes, run: Run) -> None:
