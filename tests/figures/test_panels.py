@@ -132,3 +132,16 @@ def test_a_factor_of_the_numbers_is_not_under_the_title() -> None:
     assert factor.get_text() == "1e7"
     boxes = [text.get_window_extent(canvas.get_renderer()) for text in (factor, title)]
     assert not boxes[0].overlaps(boxes[1])
+
+
+def test_long_words_leave_room_for_what_is_drawn() -> None:
+    """Otherwise the points of a sweep over many settings, whose names are long, had no picture."""
+    figure = PanelFigure((7.8, 2.8), 1, 3)
+    for axes in figure.axes:
+        curve(axes, "linear", 1.0)
+        axes.set_title("mean_delay=0.25 s, jitter.high=3.2 ms, loss=1.4 %, cross_traffic=0.8")
+    pixels(figure)
+    assert min(axes.bbox.width for axes in figure.axes) > 0.2 * figure.bbox.width
+    figure.axes[0].annotate("w" * 200, (20.0, 1.0), xycoords=("data", "axes fraction"))
+    pixels(figure)
+    assert min(axes.bbox.width for axes in figure.axes) > 0.09 * figure.bbox.width

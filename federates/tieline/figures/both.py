@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tieline.figures.scales import POINTS_PER_INCH
 
 _HAIRLINE_POINTS = 0.3
+"""Edges as wide as this hide the gaps that viewers of SVG leave between cells."""
 
 
 class Both(RendererBase):
@@ -114,7 +115,6 @@ class Both(RendererBase):
     ) -> None:
         """Draw a mesh of coloured cells."""
         mesh = (meshWidth, meshHeight, coordinates, offsets)
-        # Between cells without edges a viewer of SVG would show the paper.
         edged = self.new_gc()
         edged.copy_properties(gc)
         edged.set_linewidth(max(_HAIRLINE_POINTS, gc.get_linewidth()))

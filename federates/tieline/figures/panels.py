@@ -19,6 +19,9 @@ _PAD_POINTS = 3.0
 _FIRST_GUESS = {"left": 0.1, "right": 0.98, "bottom": 0.1, "top": 0.95}
 """Of the figure's size: where panels stand before their labels are measured."""
 
+_LEAST = 0.3
+"""Of the figure's size: what is left to the panels, however long their labels are."""
+
 _MOST_INTERVALS = 9
 """Between ticks; a scale has no more, however long it is."""
 
@@ -56,28 +59,30 @@ class Panel(Axes):
         boxes = [self.bbox.frozen()]
         for scale in (self.xaxis, self.yaxis):
             boxes += scale.tick_boxes(renderer)
-        boxes += [text.get_window_extent(renderer) for text in self._words(renderer)]
+        boxes += [text.get_window_extent(renderer) for text in self.texts]
         around = Bbox.union(boxes)
+        # A long title may reach over the next panel's: across it takes no room.
+        above = max([around.y1, *(t.get_window_extent(renderer).y1 for t in self._above(renderer))])
         return np.array(
             [
                 max(self.bbox.x0 - around.x0, self.yaxis.thickness(renderer)),
                 max(self.bbox.y0 - around.y0, self.xaxis.thickness(renderer)),
                 around.x1 - self.bbox.x1,
-                around.y1 - self.bbox.y1,
+                above - self.bbox.y1,
             ]
         )
 
-    def _words(self, renderer: RendererBase) -> list[Text]:
-        """Return all texts in and around the panel; titles go above the factor of the scale."""
+    def _above(self, renderer: RendererBase) -> list[Text]:
+        """Return titles and the vertical scale's factor, which goes below them."""
         words = [t for t in self.get_children() if isinstance(t, Text) and t.get_text()]
+        titles = [text for text in words if text not in self.texts]
         factor = self.yaxis.offsetText
         if not factor.get_text():
-            return words
+            return titles
         height = factor.get_window_extent(renderer).height
-        for title in words:
-            if title not in self.texts:
-                title.set_y(1 + height / self.bbox.height)
-        return [*words, factor]
+        for title in titles:
+            title.set_y(1 + height / self.bbox.height)
+        return [*titles, factor]
 
 
 class PanelFigure(Figure):
@@ -158,6 +163,7 @@ def _spread(
 ) -> tuple[Floats, float]:
     """Return where each panel of a row begins (n,), and how long each of them is."""
     count = len(before)
-    length = (whole - first - pad - before.sum() - behind.sum() - 2 * pad * (count - 1)) / count
+    labels = first + pad + before.sum() + behind.sum() + 2 * pad * (count - 1)
+    length = max(whole - labels, _LEAST * whole) / count
     begins = first + np.cumsum(before) + np.cumsum(behind) - behind
     return begins + (length + 2 * pad) * np.arange(count), float(length)
