@@ -21,12 +21,18 @@ class TableFile:
     """A table that is open for several readings: to open a wide one takes as long as to read it.
 
     It is closed at the end of a `with`, or when nobody holds it any more.
+
+    Args:
+        path: of the table.
+        repeated: columns of few texts, each many times: `parts` gives them as Arrow's dictionaries.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, repeated: Sequence[str] = ()) -> None:
         self._path = path
+        self._parquet = None
         # A stream is what the disk had no room to turn into Parquet.
-        self._parquet = pq.ParquetFile(path) if path.suffix == ".parquet" else None
+        if path.suffix == ".parquet":
+            self._parquet = pq.ParquetFile(path, read_dictionary=list(repeated))
 
     def __enter__(self) -> Self:
         return self

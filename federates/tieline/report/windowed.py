@@ -33,7 +33,7 @@ class Windowed:
     """
 
     def __init__(self, path: Path | None, *keys: str) -> None:
-        self._table = None if path is None else TableFile(path)
+        self._table = None if path is None else TableFile(path, keys)
         self.keys: list[tuple[str, ...]] = []
         numbers: dict[tuple[str, ...], int] = {}
         found = [(_instants(part), _numbered(part, keys, numbers)) for part in self._parts(*keys)]
@@ -90,7 +90,7 @@ def _instants(part: pa.Table) -> Floats:
 
 def _numbered(part: pa.Table, keys: Sequence[str], numbers: dict[tuple[str, ...], int]) -> Integers:
     """Return the number of each row's keys; new ones are added to `numbers`."""
-    encoded = [part.column(key).combine_chunks().dictionary_encode() for key in keys]
+    encoded = [_encoded(part.column(key).combine_chunks()) for key in keys]
     texts = [one.dictionary.to_pylist() for one in encoded]
     shape = tuple(max(1, len(text)) for text in texts)
     codes = np.ravel_multi_index(
@@ -103,3 +103,8 @@ def _numbered(part: pa.Table, keys: Sequence[str], numbers: dict[tuple[str, ...]
         key = tuple(text[place] for text, place in zip(texts, places, strict=True))
         number_of[which] = numbers.setdefault(key, len(numbers))
     return number_of[inverse]
+
+
+def _encoded(texts: pa.Array) -> pa.DictionaryArray:
+    # A stream's are not, and to encode them imports all that Arrow computes, a sixth of a second.
+    return texts if pa.types.is_dictionary(texts.type) else texts.dictionary_encode()
