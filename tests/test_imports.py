@@ -122,6 +122,13 @@ def test_a_page_is_written_from_result_folders_only(path: Path) -> None:
     assert begins(names, "tieline.experiment") <= known
 
 
+def test_what_draws_figures_knows_nothing_of_what_they_show() -> None:
+    """Panels and files must serve a case's modes as well as a run."""
+    for path in part("figures"):
+        names = imports(path)
+        assert begins(names, "tieline") <= begins(names, "tieline.figures"), path
+
+
 def test_nothing_rests_on_the_reproduction_of_the_paper() -> None:
     """It uses everything; whatever used it would be tied to one paper."""
     for path in MODULES:

@@ -1,5 +1,7 @@
 """Figures of the network's series show what the tables hold."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +28,21 @@ def test_a_run_with_series_gets_its_figures(tmp_path: Path) -> None:
     assert names == ["controller_delay.png", "controller_age.png", "busiest_links.png"]
     assert all((tmp_path / "r" / "plots" / name).stat().st_size > 10_000 for name in names)
     assert all((tmp_path / "r" / "plots" / name).with_suffix(".svg").is_file() for name in names)
+
+
+def test_drawing_imports_neither_pandas_nor_what_arrow_computes(tmp_path: Path) -> None:
+    """Otherwise the end of every run would wait as long for them as for two figures."""
+    recorded(tmp_path / "r", 1)
+    script = (
+        "import sys; from pathlib import Path; import tieline.experiment.report, tieline.report;"
+        "from tieline.report.windowed import Windowed;"
+        "Windowed(Path(sys.argv[1]) / 'link_series.parquet', 'from', 'to').totals('utilisation');"
+        "print({'pandas', 'pyarrow.compute'} & set(sys.modules))"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", script, tmp_path / "r"], check=True, capture_output=True, text=True
+    )
+    assert told.stdout == "set()\n"
 
 
 def test_a_run_without_series_is_refused(tmp_path: Path) -> None:

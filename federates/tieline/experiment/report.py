@@ -14,7 +14,7 @@ from tieline.experiment.overrides import shortest
 from tieline.experiment.plots import draw, drawn_unit
 from tieline.experiment.results import SUMMARY, Run, read_manifest, read_runs
 from tieline.experiment.table import FIELDS, Summary, shown, write_csv
-from tieline.report import write_pages
+from tieline.report import write_page, write_point_pages
 from tieline.report.network_figures import draw as draw_network
 from tieline.report.network_figures import has_series, network_plots
 
@@ -33,13 +33,12 @@ def report(folder: Path, console: Console) -> None:
         raise InputError(f"{folder} holds no complete run ({manifest['reason']})")
     summaries = [run.summary() for run in runs]
     write_csv(folder / "table.csv", summaries)
-    others = manifest["kind"] == "run" and has_series(folder)
-    network = Aside(partial(draw_network, folder)) if others else None
+    meanwhile = Aside(partial(_network_or_points, folder))
     plots = draw(folder / "plots", runs)
-    page = write_pages(folder, drawn_unit(runs[0]))
-    if network is not None:
-        network.join()
-        plots += network_plots(folder)
+    meanwhile.join()
+    # It has links to all that is there by now.
+    page = write_page(folder, drawn_unit(runs[0]))
+    plots += network_plots(folder)
     console.print(closing_table(summaries))
     for summary in summaries:
         if summary["ending"]:
@@ -66,6 +65,14 @@ def closing_table(summaries: Sequence[Summary]) -> Table:
         cells = [shown(summary, field) for field in FIELDS]
         table.add_row(*([summary["label"]] if is_sweep else []), *cells)
     return table
+
+
+def _network_or_points(folder: Path) -> None:
+    """Draw a single run's network, if it has series; write the pages of a sweep's points."""
+    if read_manifest(folder)["kind"] != "run":
+        write_point_pages(folder)
+    elif has_series(folder):
+        draw_network(folder)
 
 
 def _summary_file(folder: Path, runs: Sequence[Run]) -> Path:

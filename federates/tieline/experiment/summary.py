@@ -1,16 +1,14 @@
 """Condenses a run to the numbers of its closing table; reads result folders only."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tieline.columns import Columns
 from tieline.experiment.results import Run
 from tieline.experiment.ringdown import ring_down
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SETTLING_S = 5.0
 """The settling value is the mean over this long at the end of a run that lasts four times as long
@@ -32,8 +30,13 @@ def summarise(run: Run) -> dict[str, Any]:
     Raises:
         InputError: the run's files cannot be read.
     """
+    with run.kept_open():
+        return _summary(run)
+
+
+def _summary(run: Run) -> dict[str, Any]:
     # Never all of its columns at once: those of a long run take more memory than the run itself.
-    grid = run.table("grid", "t_s", "coi_pu")
+    grid = run.values("grid", "t_s", "coi_pu")
     told = run.told()
     return {
         "label": run.label,
@@ -41,14 +44,14 @@ def summarise(run: Run) -> dict[str, Any]:
         "frequency": _frequency(run, grid, float(told["frequency_hz"])),
         "swing": _swing(run, grid, told.get("tie_mode")),
         "delay": _delay(run),
-        "packets": _packets(run.table("flows")),
+        "packets": _packets(run.values("flows")),
         "age": _age(run),
         "lowest_voltage": _lowest_voltage(run),
         "times": run.manifest.get("times", {}),
     }
 
 
-def _frequency(run: Run, grid: "pd.DataFrame", nominal_hz: float) -> dict[str, Any]:
+def _frequency(run: Run, grid: Columns, nominal_hz: float) -> dict[str, Any]:
     """Nadir after the first event and settling value of the centre-of-inertia frequency."""
     time_s, frequency_hz = _values(grid, "t_s"), nominal_hz * _values(grid, "coi_pu")
     # The ending of a run without a future is logged last; nothing is recorded from it on.
@@ -68,7 +71,7 @@ def _frequency(run: Run, grid: "pd.DataFrame", nominal_hz: float) -> dict[str, A
     }
 
 
-def _swing(run: Run, grid: "pd.DataFrame", tie_mode: Mapping[str, Any] | None) -> dict[str, Any]:
+def _swing(run: Run, grid: Columns, tie_mode: Mapping[str, Any] | None) -> dict[str, Any]:
     """Ring-down of the tie mode: one group of units against another, after the last event."""
     if tie_mode is None:
         return _no_swing("the case names no tie mode")
@@ -109,33 +112,34 @@ def _no_swing(reason: str | None) -> dict[str, Any]:
 def _mean_speed(run: Run, units: list[str]) -> NDArray[np.float64]:
     names = [f"speed_pu.{unit}" for unit in units]
     blocks = run.blocks("grid", names)
-    return np.mean([_values(block, name) for block in blocks for name in map(str, block)], axis=0)
+    return np.mean([_values(block, name) for block in blocks for name in block], axis=0)
 
 
 def _delay(run: Run) -> dict[str, Any]:
     """Combined delay over every delivered packet; the setting where no packets are sent."""
-    flows, counts = run.table("flows"), run.table("delays")
+    flows, counts = run.values("flows"), run.values("delays")
     network = run.config["network"]
     if run.config["wams"]["reporting"] == "continuous":
         delay_s = float(network["delay"] or 0.0)
         return dict.fromkeys(("mean_s", "p50_s", "p95_s", "max_s"), delay_s) | {"jitter_s": 0.0}
-    delivered = _values(flows, "delivered") if len(flows) else np.zeros(0)
+    delivered = _values(flows, "delivered") if flows else np.zeros(0)
     if not delivered.sum():
         return dict.fromkeys(("mean_s", "p50_s", "p95_s", "max_s", "jitter_s"))
-    arrived = flows[delivered > 0]
-    weights = delivered[delivered > 0]
+    arrived = delivered > 0
+    weights = delivered[arrived]
+    jitter_s = np.nan_to_num(_values(flows, "jitter_s"))
     return {
-        "mean_s": float(np.average(arrived["delay_mean_s"], weights=weights)),
+        "mean_s": float(np.average(flows["delay_mean_s"][arrived], weights=weights)),
         "p50_s": _quantile(counts, 0.5),
         "p95_s": _quantile(counts, 0.95),
-        "max_s": float(arrived["delay_max_s"].max()),
-        "jitter_s": float(np.average(arrived["jitter_s"].fillna(0.0), weights=weights)),
+        "max_s": float(np.nanmax(flows["delay_max_s"][arrived])),
+        "jitter_s": float(np.average(jitter_s[arrived], weights=weights)),
     }
 
 
-def _quantile(counts: "pd.DataFrame", share: float) -> float | None:
+def _quantile(counts: Columns, share: float) -> float | None:
     """Return a quantile from the histogram, linear within a bin."""
-    if not len(counts) or not counts["count"].sum():
+    if not counts or not counts["count"].sum():
         return None
     heights = _values(counts, "count")
     reached = np.concatenate([[0.0], np.cumsum(heights)]) / heights.sum()
@@ -145,7 +149,7 @@ def _quantile(counts: "pd.DataFrame", share: float) -> float | None:
     return float(low + within * (high - low))
 
 
-def _packets(flows: "pd.DataFrame") -> dict[str, Any]:
+def _packets(flows: Columns) -> dict[str, Any]:
     names = ("sent", "delivered", "dropped_queue", "dropped_loss", "dropped_down", "in_flight")
     totals = {name: int(flows[name].sum()) if name in flows else 0 for name in names}
     lost = totals["dropped_queue"] + totals["dropped_loss"] + totals["dropped_down"]
@@ -159,10 +163,10 @@ def _age(run: Run) -> dict[str, Any]:
     prefix = "age_s."
     names = [name for name in run.columns("grid") if name.startswith(prefix)]
     means = {
-        column.removeprefix(prefix): float(block[column].mean())
+        column.removeprefix(prefix): float(np.nanmean(values))
         for block in run.blocks("grid", names)
-        for column in map(str, block)
-        if block[column].notna().any()
+        for column, values in block.items()
+        if not np.isnan(values).all()
     }
     mean = float(np.mean(list(means.values()))) if means else None
     return {"mean_s": mean, "controllers_s": means}
@@ -176,13 +180,13 @@ def _lowest_voltage(run: Run) -> dict[str, Any] | None:
     if not names:
         return None
     lowest = {
-        name: float(block[name].min())
+        name: float(np.fmin.reduce(values))
         for block in run.blocks("grid", names)
-        for name in map(str, block)
+        for name, values in block.items()
     }
     column = min(lowest, key=lambda name: lowest[name])
-    of_it = run.table("grid", "t_s", column)
-    row = int(_values(of_it, column).argmin())
+    of_it = run.values("grid", "t_s", column)
+    row = int(np.nanargmin(_values(of_it, column)))
     return {
         "unit": column.removeprefix(prefix),
         "vt_pu": lowest[column],
@@ -190,5 +194,5 @@ def _lowest_voltage(run: Run) -> dict[str, Any] | None:
     }
 
 
-def _values(table: "pd.DataFrame", column: str) -> NDArray[np.float64]:
-    return table[column].to_numpy(dtype=np.float64)
+def _values(table: Columns, column: str) -> NDArray[np.float64]:
+    return table[column].astype(np.float64)
