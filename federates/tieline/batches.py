@@ -1,4 +1,4 @@
-"""Columns of NumPy arrays as one batch of rows that Arrow writes."""
+"""Columns of NumPy arrays as one batch of rows that Arrow writes, and back."""
 
 from collections.abc import Mapping
 from typing import Any, NoReturn
@@ -36,6 +36,17 @@ def batch_of(
     return pa.RecordBatch.from_arrays([made[column] for column in schema.names], schema=schema)
 
 
+def values_of(column: pa.ChunkedArray) -> NDArray[Any]:
+    """Return a column as NumPy has it, NaN for null; texts as objects.
+
+    The inverse of what `batch_of` does. Its own `to_numpy` would import pandas.
+    """
+    chunks = [_values(chunk) for chunk in column.chunks]
+    if len(chunks) == 1:
+        return chunks[0]
+    return np.concatenate([np.empty(0, column.type.to_pandas_dtype()), *chunks])
+
+
 def _refuse_infinity(
     name: str, arrays: Mapping[str, NDArray[Any]], t_s: NDArray[Any] | None
 ) -> NoReturn:
@@ -66,3 +77,22 @@ def _array(kind: pa.DataType, values: NDArray[np.generic]) -> pa.Array:
         if nulls:
             valid = pa.py_buffer(np.packbits(~is_missing, bitorder="little"))
     return pa.Array.from_buffers(kind, len(data), [valid, pa.py_buffer(data)], nulls)
+
+
+def _values(array: pa.Array) -> NDArray[Any]:
+    if pa.types.is_string(array.type):
+        return np.array(array.to_pylist(), dtype=object)
+    span = slice(array.offset, array.offset + len(array))
+    valid, data = array.buffers()
+    kind = np.dtype(array.type.to_pandas_dtype())
+    if data is None:
+        return np.empty(0, kind)
+    if pa.types.is_boolean(array.type):
+        return _bits(data, span).astype(kind)
+    values: NDArray[Any] = np.frombuffer(data, kind, span.stop)[span]
+    return values if array.null_count == 0 else np.where(_bits(valid, span), values, np.nan)
+
+
+def _bits(buffer: pa.Buffer, span: slice) -> NDArray[np.bool_]:
+    bits = np.unpackbits(np.frombuffer(buffer, np.uint8), count=span.stop, bitorder="little")
+    return bits[span].astype(bool)

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from numpy.typing import NDArray
+
 from tieline.experiment.folder import FORMAT, MANIFEST, is_result, read_json, read_manifest
 from tieline.experiment.table_hash import table_hash
 from tieline.table_parts import row_count
-from tieline.tables import column_names, read_table, stored
+from tieline.tables import column_names, read_table, read_values, stored
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -83,12 +85,23 @@ class Run:
 
         return pd.DataFrame()
 
+    def values(self, name: str, *columns: str) -> dict[str, NDArray[Any]]:
+        """Return a table's columns, or some, as arrays, NaN for null; none if it was not written.
+
+        Nothing is imported for it, so that what ends a run waits for nothing.
+        """
+        path = self.path(name)
+        return {} if path is None else read_values(path, columns or None)
+
+    def each(self, name: str, columns: Sequence[str]) -> Iterator[tuple[str, NDArray[Any]]]:
+        """Yield name and values of some columns of a table, as many read at a time as `blocks`."""
+        for some in self._at_once(name, columns):
+            yield from self.values(name, *some).items()
+
     def blocks(self, name: str, columns: Sequence[str]) -> "Iterator[pd.DataFrame]":
         """Yield some columns of a table that was written, as many at a time as are a few MB."""
-        path = self.path(name)
-        at_once = 1 if path is None else max(1, _VALUES_AT_ONCE // max(1, row_count(path)))
-        for first in range(0, len(columns), at_once):
-            yield self.table(name, *columns[first : first + at_once])
+        for some in self._at_once(name, columns):
+            yield self.table(name, *some)
 
     def columns(self, name: str) -> list[str]:
         """Return the names of a table's columns; none if it was not written."""
@@ -97,23 +110,29 @@ class Run:
 
     def events(self) -> list[tuple[float, str]]:
         """Return (instant in s, what happens) of each event, in order of time."""
-        log = self.table("events")
-        if log.empty:
+        log = self.values("events")
+        if not log:
             return []
         return [(float(t_s), str(what)) for t_s, what in zip(log["t_s"], log["what"], strict=True)]
 
     def ending(self) -> str | None:
         """Return why the run was over before its time, as a result; None if it was not."""
-        log = self.table("events")
-        if log.empty or not log["is_ending"].any():
+        log = self.values("events")
+        if not log or not log["is_ending"].any():
             return None
-        row = log[log["is_ending"] == 1].iloc[0]
-        return f"{row['what']} at {row['t_s']:.3f} s"
+        row = log["is_ending"].tolist().index(1)
+        return f"{log['what'][row]} at {log['t_s'][row]:.3f} s"
 
     def tripped_units(self) -> set[str]:
         """Return the units that an event trips; they go on alone and count in no average."""
         events = self.config["grid"]["events"]
         return {event["trip_generator"] for event in events if "trip_generator" in event}
+
+    def _at_once(self, name: str, columns: Sequence[str]) -> Iterator[Sequence[str]]:
+        path = self.path(name)
+        count = 1 if path is None else max(1, _VALUES_AT_ONCE // max(1, row_count(path)))
+        for first in range(0, len(columns), count):
+            yield columns[first : first + count]
 
 
 def common_events(runs: Sequence[Run]) -> list[tuple[float, str]]:

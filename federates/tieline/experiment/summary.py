@@ -1,7 +1,7 @@
 """Condenses a run to the numbers of its closing table; reads result folders only."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from tieline.experiment.results import Run
 from tieline.experiment.ringdown import ring_down
 
-if TYPE_CHECKING:
-    import pandas as pd
+Table = Mapping[str, NDArray[Any]]
+"""Columns by name; none where the table was not written."""
 
 SETTLING_S = 5.0
 """The settling value is the mean over this long at the end of a run that lasts four times as long
@@ -33,7 +33,7 @@ def summarise(run: Run) -> dict[str, Any]:
         InputError: the run's files cannot be read.
     """
     # Never all of its columns at once: those of a long run take more memory than the run itself.
-    grid = run.table("grid", "t_s", "coi_pu")
+    grid = run.values("grid", "t_s", "coi_pu")
     told = run.told()
     return {
         "label": run.label,
@@ -41,14 +41,14 @@ def summarise(run: Run) -> dict[str, Any]:
         "frequency": _frequency(run, grid, float(told["frequency_hz"])),
         "swing": _swing(run, grid, told.get("tie_mode")),
         "delay": _delay(run),
-        "packets": _packets(run.table("flows")),
+        "packets": _packets(run.values("flows")),
         "age": _age(run),
         "lowest_voltage": _lowest_voltage(run),
         "times": run.manifest.get("times", {}),
     }
 
 
-def _frequency(run: Run, grid: "pd.DataFrame", nominal_hz: float) -> dict[str, Any]:
+def _frequency(run: Run, grid: Table, nominal_hz: float) -> dict[str, Any]:
     """Nadir after the first event and settling value of the centre-of-inertia frequency."""
     time_s, frequency_hz = _values(grid, "t_s"), nominal_hz * _values(grid, "coi_pu")
     # The ending of a run without a future is logged last; nothing is recorded from it on.
@@ -68,7 +68,7 @@ def _frequency(run: Run, grid: "pd.DataFrame", nominal_hz: float) -> dict[str, A
     }
 
 
-def _swing(run: Run, grid: "pd.DataFrame", tie_mode: Mapping[str, Any] | None) -> dict[str, Any]:
+def _swing(run: Run, grid: Table, tie_mode: Mapping[str, Any] | None) -> dict[str, Any]:
     """Ring-down of the tie mode: one group of units against another, after the last event."""
     if tie_mode is None:
         return _no_swing("the case names no tie mode")
@@ -108,34 +108,34 @@ def _no_swing(reason: str | None) -> dict[str, Any]:
 
 def _mean_speed(run: Run, units: list[str]) -> NDArray[np.float64]:
     names = [f"speed_pu.{unit}" for unit in units]
-    blocks = run.blocks("grid", names)
-    return np.mean([_values(block, name) for block in blocks for name in map(str, block)], axis=0)
+    return np.mean([values for _, values in run.each("grid", names)], axis=0)
 
 
 def _delay(run: Run) -> dict[str, Any]:
     """Combined delay over every delivered packet; the setting where no packets are sent."""
-    flows, counts = run.table("flows"), run.table("delays")
+    flows, counts = run.values("flows"), run.values("delays")
     network = run.config["network"]
     if run.config["wams"]["reporting"] == "continuous":
         delay_s = float(network["delay"] or 0.0)
         return dict.fromkeys(("mean_s", "p50_s", "p95_s", "max_s"), delay_s) | {"jitter_s": 0.0}
-    delivered = _values(flows, "delivered") if len(flows) else np.zeros(0)
+    delivered = _values(flows, "delivered") if flows else np.zeros(0)
     if not delivered.sum():
         return dict.fromkeys(("mean_s", "p50_s", "p95_s", "max_s", "jitter_s"))
-    arrived = flows[delivered > 0]
-    weights = delivered[delivered > 0]
+    arrived = {name: values[delivered > 0] for name, values in flows.items()}
+    weights = _values(arrived, "delivered")
+    jitter_s = _values(arrived, "jitter_s")
     return {
         "mean_s": float(np.average(arrived["delay_mean_s"], weights=weights)),
         "p50_s": _quantile(counts, 0.5),
         "p95_s": _quantile(counts, 0.95),
         "max_s": float(arrived["delay_max_s"].max()),
-        "jitter_s": float(np.average(arrived["jitter_s"].fillna(0.0), weights=weights)),
+        "jitter_s": float(np.average(np.where(np.isnan(jitter_s), 0.0, jitter_s), weights=weights)),
     }
 
 
-def _quantile(counts: "pd.DataFrame", share: float) -> float | None:
+def _quantile(counts: Table, share: float) -> float | None:
     """Return a quantile from the histogram, linear within a bin."""
-    if not len(counts) or not counts["count"].sum():
+    if not counts or not counts["count"].sum():
         return None
     heights = _values(counts, "count")
     reached = np.concatenate([[0.0], np.cumsum(heights)]) / heights.sum()
@@ -145,7 +145,7 @@ def _quantile(counts: "pd.DataFrame", share: float) -> float | None:
     return float(low + within * (high - low))
 
 
-def _packets(flows: "pd.DataFrame") -> dict[str, Any]:
+def _packets(flows: Table) -> dict[str, Any]:
     names = ("sent", "delivered", "dropped_queue", "dropped_loss", "dropped_down", "in_flight")
     totals = {name: int(flows[name].sum()) if name in flows else 0 for name in names}
     lost = totals["dropped_queue"] + totals["dropped_loss"] + totals["dropped_down"]
@@ -159,10 +159,9 @@ def _age(run: Run) -> dict[str, Any]:
     prefix = "age_s."
     names = [name for name in run.columns("grid") if name.startswith(prefix)]
     means = {
-        column.removeprefix(prefix): float(block[column].mean())
-        for block in run.blocks("grid", names)
-        for column in map(str, block)
-        if block[column].notna().any()
+        column.removeprefix(prefix): float(np.nansum(values) / np.count_nonzero(~np.isnan(values)))
+        for column, values in run.each("grid", names)
+        if not np.isnan(values).all()
     }
     mean = float(np.mean(list(means.values()))) if means else None
     return {"mean_s": mean, "controllers_s": means}
@@ -175,14 +174,10 @@ def _lowest_voltage(run: Run) -> dict[str, Any] | None:
     names = [name for name in run.columns("grid") if name.startswith(prefix) and name not in lost]
     if not names:
         return None
-    lowest = {
-        name: float(block[name].min())
-        for block in run.blocks("grid", names)
-        for name in map(str, block)
-    }
+    lowest = {name: float(np.nanmin(values)) for name, values in run.each("grid", names)}
     column = min(lowest, key=lambda name: lowest[name])
-    of_it = run.table("grid", "t_s", column)
-    row = int(_values(of_it, column).argmin())
+    of_it = run.values("grid", "t_s", column)
+    row = int(np.nanargmin(of_it[column]))
     return {
         "unit": column.removeprefix(prefix),
         "vt_pu": lowest[column],
@@ -190,5 +185,5 @@ def _lowest_voltage(run: Run) -> dict[str, Any] | None:
     }
 
 
-def _values(table: "pd.DataFrame", column: str) -> NDArray[np.float64]:
-    return table[column].to_numpy(dtype=np.float64)
+def _values(table: Table, column: str) -> NDArray[np.float64]:
+    return np.asarray(table[column], dtype=np.float64)

@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from tieline.batches import values_of
 from tieline.tables import read_whole
 
 Parts = Iterable[pa.ChunkedArray]
@@ -73,7 +74,7 @@ def _hash_texts(digest: "hashlib._Hash", parts: Parts) -> None:
 
 def _hash_numbers(digest: "hashlib._Hash", parts: Parts) -> None:
     for part in parts:
-        values = part.to_numpy()
+        values = values_of(part)
         if values.dtype.kind == "f":
             values = np.where(np.isnan(values), np.nan, values).astype(values.dtype)
         digest.update(values.astype(values.dtype.newbyteorder("<")).tobytes())

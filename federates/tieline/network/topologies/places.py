@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import cKDTree
 
 from tieline.network.topologies.stations import Corridor
 from tieline.streams import stream
@@ -108,6 +107,9 @@ class Land:
 
     def neighbours(self, count: int) -> tuple[Integers, Floats]:
         """Return the nearest places, see `Places`."""
+        # A fifth of a second, only for those who lay out a network.
+        from scipy.spatial import cKDTree
+
         km, near = cKDTree(self.xy_km).query(self.xy_km, count + 1)
         own = near == np.arange(len(self.names))[:, None]
         # Of places that coincide, the nearest may not hold the place itself.
