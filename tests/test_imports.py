@@ -79,7 +79,7 @@ def test_only_the_cluster_needs_dask() -> None:
             ), path
 
 
-@pytest.mark.parametrize("name", ["report", "plots", "summary", "table"])
+@pytest.mark.parametrize("name", ["artist", "drawn", "plots", "report", "summary", "table"])
 def test_what_reports_reads_result_folders_only(name: str) -> None:
     """A report that reached into a simulation could show what no folder holds."""
     names = imports(ROOT / "experiment" / f"{name}.py")

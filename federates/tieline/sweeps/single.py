@@ -2,7 +2,7 @@
 
 import importlib
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ FEDERATES = ("tieline.network.federate", "tieline.grid.federate")
 WITH_HELICS = ("tieline.cosim.federate", "tieline.cosim.inproc")
 """What a process imports before it forks federates; the second only for a core of HELICS."""
 
-Steps = Sequence[Callable[[], object]]
+Steps = Iterable[Callable[[], object]]
 """What makes a process ready to fork federates, in order."""
 
 
