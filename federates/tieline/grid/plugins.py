@@ -86,13 +86,14 @@ def file_models(path: Path, role: str) -> dict[str, "type[Model]"]:
 
 
 def _offered(role: str) -> EntryPoints:
-    return _entry_points(tuple(sys.path)).select(group=f"tieline.{role}")
+    return _entry_points(tuple(sys.path))[role]
 
 
 @cache
-def _entry_points(path: tuple[str, ...]) -> EntryPoints:
-    """Return those of all packages on the path: a file for each is read, whatever the group."""
-    return entry_points()
+def _entry_points(path: tuple[str, ...]) -> dict[str, EntryPoints]:
+    """Return by role what the packages on the path offer: a file of each of them is read for it."""
+    found = entry_points()
+    return {role: found.select(group=f"tieline.{role}") for role in FOLDERS}
 
 
 def _run(path: Path, where: str) -> ModuleType:

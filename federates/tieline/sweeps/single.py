@@ -23,11 +23,11 @@ WITH_HELICS = ("tieline.cosim.federate", "tieline.cosim.inproc")
 """What a process imports before it forks federates; the second only for a core of HELICS."""
 
 Steps = Iterable[Callable[[], object]]
-"""What makes a process ready to fork federates, in order."""
+"""What makes a process ready to fork others, in order."""
 
 
 def shared_steps() -> Steps:
-    """Return what the check of a case needs as well as the federates."""
+    """Return what the check of a case needs as well as federates do."""
     return partial(importlib.import_module, "tieline.grid.federate"), _load_models
 
 
