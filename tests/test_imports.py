@@ -161,6 +161,11 @@ def test_a_packet_is_looked_up_without_grid_and_federation() -> None:
         assert not begins(imports(path), *forbidden), path
 
 
+READY = (
+    "import tieline.experiment.run, tieline.experiment.report;"
+    "from tieline.sweeps.single import shared_steps, own_steps;"
+    "[step() for step in (*shared_steps(), *own_steps('zmq'))]"
+)
 LARGE = {"numba", "llvmlite", "matplotlib", "pandas", "pyarrow", "scipy", "networkx", "helics"}
 
 
@@ -169,9 +174,9 @@ LARGE = {"numba", "llvmlite", "matplotlib", "pandas", "pyarrow", "scipy", "netwo
     [
         ("import tieline.cli", LARGE | {"numpy", "pydantic", "yaml", "rich"}),
         ("from tieline.experiment.load import load_experiment as l; l('g26_trip')", LARGE),
-        ("import tieline.network.federate, tieline.grid.federate", {"pandas", "matplotlib"}),
+        (READY, {"pandas", "matplotlib", "networkx"}),
     ],
-    ids=["the command line", "a checked experiment", "the federates"],
+    ids=["the command line", "a checked experiment", "a launcher with its federates"],
 )
 def test_nothing_large_is_imported_before_it_is_used(script: str, forbidden: set[str]) -> None:
     """Help and a mistake in a file would come seconds late, and every federate start so."""

@@ -18,9 +18,6 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Pair = tuple[str, str]
 
-NS_PER_KM = 5_000
-"""Optical fibre: ITU-T G.114, annex A."""
-
 ROUTE_FACTOR = 1.5
 """Length of a cable over the great-circle distance: ITU-T G.826 for less than 1,000 km."""
 
