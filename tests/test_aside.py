@@ -51,6 +51,12 @@ def test_the_answer_of_the_fork_comes_back_however_long() -> None:
     assert (word, len(long)) == ("told", 500_000)
 
 
+def test_work_that_nobody_began_begins_when_it_is_waited_for() -> None:
+    """Both processes would otherwise wait for each other for ever."""
+    with Aside(os.getpid) as work:
+        assert work.join() != os.getpid()
+
+
 def test_what_the_work_raises_is_raised_where_it_is_waited_for() -> None:
     """A figure that cannot be drawn would otherwise be missed by whoever looks for it."""
 

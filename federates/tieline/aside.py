@@ -35,7 +35,7 @@ class Aside:
         self, work: Callable[..., Any], prepare: Callable[[], object] = lambda: None
     ) -> None:
         self._work = work
-        self._words: tuple[str, ...] = ()
+        self._words: tuple[str, ...] | None = None
         self._fork: _Fork | None = None
         if sys.platform.startswith("linux") and threading.active_count() == 1:
             self._fork = _Fork(work, prepare)
@@ -52,14 +52,18 @@ class Aside:
         return self._fork is None or self._fork.has_answered()
 
     def join(self) -> Any:
-        """Return the answer of the work that was begun.
+        """Return the answer of the work, which begins now if it has not begun.
 
         Raises:
             Exception: whatever the work raises.
         """
+        words = self._words
+        if words is None:
+            words = ()
+            self.begin()
         fork, self._fork = self._fork, None
         answer = None if fork is None else fork.answer()
-        return self._work(*self._words) if answer is None else answer["answer"]
+        return self._work(*words) if answer is None else answer["answer"]
 
     def close(self) -> None:
         """End the fork if nobody has waited for its answer."""
