@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tieline.columns import Columns, TableFile
 from tieline.errors import CosimError, NumericalError
 from tieline.tables import (
     Column,
@@ -19,7 +20,6 @@ from tieline.tables import (
     last_value,
     metadata_of,
     read_table,
-    read_values,
     readable_tables,
     salvage,
     stored,
@@ -298,6 +298,11 @@ def test_a_table_is_written_without_pandas(tmp_path: Path) -> None:
     assert table["b"].to_pylist() == [True, False, True]
 
 
+def _values_in(path: Path) -> Columns:
+    with TableFile(path) as table:
+        return table.read()
+
+
 def test_values_are_those_of_the_data_frame_in_every_type_and_part(tmp_path: Path) -> None:
     """A run's summary, read so, would otherwise differ from what a user computes from its table."""
     columns = [
@@ -318,7 +323,7 @@ def test_values_are_those_of_the_data_frame_in_every_type_and_part(tmp_path: Pat
     (tmp_path / "open.arrows").write_bytes((tmp_path / "some.arrows").read_bytes())
     stream.close()
     for path in (tmp_path / "some.parquet", tmp_path / "open.arrows"):
-        frame, values = read_table(path), read_values(path)
+        frame, values = read_table(path), _values_in(path)
         assert list(values) == list(frame)
         for name in ("x", "n", "small", "flag"):
             assert values[name].dtype == frame[name].dtype
@@ -331,7 +336,7 @@ def test_values_of_a_table_without_rows_have_their_types(tmp_path: Path) -> None
     columns = [Column("x", "pu", "number"), Column("who", "", "name", "str")]
     stream = TableStream(tmp_path / "none.parquet", columns)
     stream.close()
-    values = read_values(tmp_path / "none.parquet")
+    values = _values_in(tmp_path / "none.parquet")
     assert {name: (len(v), v.dtype) for name, v in values.items()} == {
         "x": (0, np.dtype(float)),
         "who": (0, np.dtype(object)),

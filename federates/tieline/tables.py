@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import ArrayLike, NDArray
 
-from tieline.batches import batch_of, values_of
+from tieline.batches import batch_of
 from tieline.errors import CosimError
 
 if TYPE_CHECKING:
@@ -233,12 +233,6 @@ def write_table(path: Path, columns: Sequence[Column], data: Mapping[str, ArrayL
 def read_table(path: Path, columns: Sequence[str] | None = None) -> "pd.DataFrame":
     """Return a table, or some of its columns; nulls in a column of floats become NaN."""
     return read_whole(path, columns).to_pandas()
-
-
-def read_values(path: Path, columns: Sequence[str] | None = None) -> dict[str, NDArray[Any]]:
-    """Return the columns of a table, or some of them, as arrays: `read_table` without pandas."""
-    table = read_whole(path, columns)
-    return {name: values_of(table.column(name)) for name in table.column_names}
 
 
 def column_names(path: Path) -> list[str]:

@@ -93,7 +93,8 @@ def _short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 def test_every_command_of_a_page_works(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A reader who types what the page says must not be the first to do so."""
     if page.stem != "report":
-        monkeypatch.setattr(drawn, "write_pages", lambda folder, _: folder / "report.html")
+        monkeypatch.setattr(drawn, "write_page", lambda folder, _: folder / "report.html")
+        monkeypatch.setattr(drawn, "write_point_pages", lambda _: None)
     for kind, text in commands(page.read_text(encoding="utf-8")):
         if kind == "file":
             name = text.split()[1]

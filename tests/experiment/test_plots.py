@@ -76,6 +76,21 @@ def test_each_delay_has_a_curve_and_a_colour_of_its_own(tmp_path: Path) -> None:
     assert axes.get_xlabel() == "time, s"
 
 
+def test_of_many_runs_some_are_named_and_some_have_a_histogram(tmp_path: Path) -> None:
+    """Otherwise names would cover the curves, and a figure would be as long as the sweep."""
+    (run,) = runs_of(tmp_path, EXPERIMENT)
+    runs = [Run(run.folder, {**run.manifest, "label": f"{i}"}) for i in range(26)]
+    axes = Figure().subplots()
+    frequency(axes, runs)
+    names = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert len(axes.get_lines()) == 26 + len(run.events())
+    assert (len(names), names[0], names[-1]) == (12, "0", "25")
+    assert names == sorted(names, key=int)
+    figure = delay_histograms(runs)
+    assert len(figure.axes) == 24
+    assert figure.get_supxlabel() == "combined delay, ms (24 of 26 runs)"
+
+
 def test_a_sweep_over_something_else_is_not_called_a_delay(tmp_path: Path) -> None:
     """Otherwise a legend of gains would be headed 'delay'."""
     text = EXPERIMENT + (

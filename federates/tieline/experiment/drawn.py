@@ -5,7 +5,7 @@ from pathlib import Path
 from tieline.aside import Aside
 from tieline.experiment.plots import draw, drawn_unit
 from tieline.experiment.results import read_manifest, read_runs
-from tieline.report import write_pages
+from tieline.report import write_page, write_point_pages
 from tieline.report.network_figures import draw as draw_network
 from tieline.report.network_figures import has_series
 
@@ -13,20 +13,23 @@ from tieline.report.network_figures import has_series
 def draw_result(folder: Path) -> tuple[Path, list[Path]]:
     """Write `plots/` and `report.html`, and return the page and the figures.
 
-    A single run with series of its network has figures of them too, drawn at the same time.
+    At the same time a single run with series of its network has figures of them drawn, and the
+    points of a sweep their pages written.
 
     Args:
         folder: of a result with at least one complete run.
     """
     runs = [run for run in read_runs(folder) if run.is_complete]
-    if read_manifest(folder)["kind"] != "run" or not has_series(folder):
+    with Aside(_network_or_points).begin(str(folder)) as others:
         plots = draw(folder / "plots", runs)
-        return write_pages(folder, drawn_unit(runs[0])), plots
-    with Aside(_draw_network).begin(str(folder)) as network:
-        plots = draw(folder / "plots", runs)
-        page = write_pages(folder, drawn_unit(runs[0]))
-        return page, [*plots, *map(Path, network.join())]
+        plots += map(Path, others.join())
+    # It has links to all that is there by now.
+    return write_page(folder, drawn_unit(runs[0])), plots
 
 
-def _draw_network(folder: str) -> list[str]:
-    return [str(path) for path in draw_network(Path(folder))]
+def _network_or_points(folder: str) -> list[str]:
+    """Draw a single run's network, if it has series; write the pages of a sweep's points."""
+    if read_manifest(Path(folder))["kind"] != "run":
+        write_point_pages(Path(folder))
+        return []
+    return [str(path) for path in draw_network(Path(folder))] if has_series(Path(folder)) else []

@@ -3,20 +3,26 @@
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import matplotlib as mpl
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from tieline.columns import Columns
 from tieline.experiment.results import Run
-from tieline.figures import COLOURS, PANEL_INCHES, STYLE, save
+from tieline.figures import COLOURS, PANEL_INCHES, STYLE, PanelFigure, save
+
+T = TypeVar("T")
 
 WITHOUT_PACKETS = "black"
 MOST_BARS = 80
+MOST_NAMES = 12
+"""In a legend; where there are more runs, colours in between tell enough."""
+MOST_HISTOGRAMS = 24
+"""In one figure; more could not be looked at."""
 
 BELIEF_WINDOW_S = (1.0, 11.0)
 """Before and after the first event, where a late average differs from the true one."""
@@ -37,7 +43,7 @@ def draw(folder: Path, runs: Sequence[Run]) -> list[Path]:
 
 def _figures(runs: Sequence[Run]) -> dict[str, Figure]:
     figures = {"frequency": _alone(frequency, runs), "voltage": _alone(voltage, runs)}
-    if any(len(_counts(run)) for run in runs):
+    if any(run.delays for run in runs):
         figures["delays"] = delay_histograms(runs)
     if len(runs) == 1 and believing_unit(runs[0]):
         figures["average"] = _alone(believed_average, runs)
@@ -48,7 +54,7 @@ def _figures(runs: Sequence[Run]) -> dict[str, Figure]:
 def frequency(axes: Axes, runs: Sequence[Run]) -> None:
     """Draw the frequency of the centre of inertia against time, one curve a run."""
     for run, look in zip(runs, _looks(runs), strict=True):
-        grid = run.table("grid", "t_s", "coi_pu")
+        grid = run.values("grid", "t_s", "coi_pu")
         nominal_hz = float(run.told()["frequency_hz"])
         axes.plot(grid["t_s"], nominal_hz * grid["coi_pu"], label=run.label, **look)
     _finish(axes, runs, "system frequency (centre of inertia), Hz")
@@ -59,7 +65,7 @@ def voltage(axes: Axes, runs: Sequence[Run]) -> None:
     """Draw the terminal voltage of one unit against time, one curve a run."""
     unit = drawn_unit(runs[0])
     for run, look in zip(runs, _looks(runs), strict=True):
-        grid = run.table("grid", "t_s", f"vt_pu.{unit}")
+        grid = run.values("grid", "t_s", f"vt_pu.{unit}")
         axes.plot(grid["t_s"], grid[f"vt_pu.{unit}"], label=run.label, **look)
     _finish(axes, runs, f"terminal voltage of {unit}, pu")
 
@@ -67,9 +73,9 @@ def voltage(axes: Axes, runs: Sequence[Run]) -> None:
 def delay_shares(axes: Axes, runs: Sequence[Run]) -> None:
     """Draw the share of packets that arrived within a delay, one curve a run that sent any."""
     for run, look in zip(runs, _looks(runs), strict=True):
-        counts = _counts(run)
-        if len(counts):
-            edges = [counts["bin_low_s"].iloc[0], *counts["bin_high_s"]]
+        counts = run.delays
+        if counts:
+            edges = np.append(counts["bin_low_s"][0], counts["bin_high_s"])
             reached = np.concatenate([[0.0], np.cumsum(counts["count"])]) / counts["count"].sum()
             axes.plot(edges, 100 * reached, label=run.label, **look)
     axes.set_xlim(left=0)
@@ -83,9 +89,10 @@ def believed_average(axes: Axes, runs: Sequence[Run]) -> None:
     run = runs[0]
     nominal_hz = float(run.told()["frequency_hz"])
     unit = believing_unit(run)
-    grid = run.table("grid", "t_s", "coi_pu", f"wbar_pu.{unit}")
+    grid = run.values("grid", "t_s", "coi_pu", f"wbar_pu.{unit}")
     start_s = min((at for at, _ in run.events()), default=0.0)
-    inside = grid["t_s"].between(start_s - BELIEF_WINDOW_S[0], start_s + BELIEF_WINDOW_S[1])
+    before_s, after_s = BELIEF_WINDOW_S
+    inside = (grid["t_s"] >= start_s - before_s) & (grid["t_s"] <= start_s + after_s)
     time_s = grid["t_s"][inside]
     axes.plot(
         time_s, nominal_hz * grid["coi_pu"][inside], color="black", label="true (centre of inertia)"
@@ -100,32 +107,36 @@ def believed_average(axes: Axes, runs: Sequence[Run]) -> None:
 
 def delay_histograms(runs: Sequence[Run]) -> Figure:
     """Return a figure with one histogram of the combined delays for each run that sent packets."""
-    sent = [(run, look) for run, look in zip(runs, _looks(runs), strict=True) if len(_counts(run))]
-    columns = min(3, math.ceil(math.sqrt(len(sent))))
-    rows = -(-len(sent) // columns)
+    sent = [(run, look) for run, look in zip(runs, _looks(runs), strict=True) if run.delays]
+    shown = _spread(sent, MOST_HISTOGRAMS)
+    columns = min(3, math.ceil(math.sqrt(len(shown))))
+    rows = -(-len(shown) // columns)
     size = (PANEL_INCHES[0] if columns == 1 else 2.6 * columns, 2.4 * rows + 0.4)
-    figure = Figure(figsize=size, layout="constrained")
-    grid = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes, (run, look) in zip(grid, sent, strict=False):
+    figure = PanelFigure(size, rows, columns)
+    grid = figure.axes
+    for axes, (run, look) in zip(grid, shown, strict=False):
         _histogram(axes, run, look["color"])
-    for axes in grid[len(sent) :]:
+    for axes in grid[len(shown) :]:
         axes.remove()
-    figure.supxlabel("combined delay, ms", fontsize=9.0)
+    which = f" ({len(shown)} of {len(sent)} runs)" if len(shown) < len(sent) else ""
+    figure.supxlabel(f"combined delay, ms{which}", fontsize=9.0)
     figure.supylabel("frames, % per ms", fontsize=9.0)
     return figure
 
 
 def overview(runs: Sequence[Run]) -> Figure:
     """Return frequency, voltage and delays in one figure."""
-    has_delays = any(len(_counts(run)) for run in runs)
-    figure = Figure(figsize=(6.3, 6.6 if has_delays else 4.8), layout="constrained")
-    panels = figure.subplots(3 if has_delays else 2, 1)
+    has_delays = any(run.delays for run in runs)
+    rows = 3 if has_delays else 2
+    figure = PanelFigure((PANEL_INCHES[0], 6.6 if has_delays else 4.8), rows)
+    panels = figure.axes
     frequency(panels[0], runs)
     voltage(panels[1], runs)
     panels[0].set_ylabel("system frequency, Hz")
     panels[1].set_ylabel(panels[1].get_ylabel().replace("terminal voltage of ", "voltage of "))
-    if panels[1].get_legend():
-        panels[1].get_legend().remove()
+    legend = panels[1].get_legend()
+    if legend is not None:
+        legend.remove()
     if has_delays:
         delay_shares(panels[2], runs)
     for letter, axes in zip("abc", panels, strict=False):
@@ -140,8 +151,13 @@ def drawn_unit(run: Run) -> str:
         return str(chosen)
     lost = {f"vt_pu.{unit}" for unit in run.tripped_units()}
     names = [n for n in run.columns("grid") if n.startswith("vt_pu.") and n not in lost]
-    swings = pd.concat([block.max() - block.min() for block in run.blocks("grid", names)])
-    return str(swings.idxmax()).removeprefix("vt_pu.")
+    swings = {
+        name: np.fmax.reduce(values) - np.fmin.reduce(values)
+        for block in run.blocks("grid", names)
+        for name, values in block.items()
+        if not np.isnan(values).all()
+    }
+    return max(swings, key=swings.__getitem__).removeprefix("vt_pu.")
 
 
 def believing_unit(run: Run) -> str | None:
@@ -154,8 +170,8 @@ def believing_unit(run: Run) -> str | None:
 
 
 def _alone(panel: Callable[[Axes, Sequence[Run]], None], runs: Sequence[Run]) -> Figure:
-    figure = Figure(figsize=PANEL_INCHES, layout="constrained")
-    panel(figure.subplots(), runs)
+    figure = PanelFigure(PANEL_INCHES)
+    panel(figure.axes[0], runs)
     return figure
 
 
@@ -165,7 +181,15 @@ def _finish(axes: Axes, runs: Sequence[Run], what: str) -> None:
     axes.margins(x=0)
     axes.ticklabel_format(useOffset=False)
     if len(runs) > 1:
-        axes.legend(title=_legend_title(runs), title_fontsize=8.0, ncols=2)
+        named = _spread(axes.get_legend_handles_labels()[0], MOST_NAMES)
+        axes.legend(handles=named, title=_legend_title(runs), title_fontsize=8.0, ncols=2)
+
+
+def _spread(items: Sequence[T], most: int) -> Sequence[T]:
+    """Return the first and the last and what is evenly between, `most` in all; all if fewer."""
+    if len(items) <= most:
+        return items
+    return [items[round(i * (len(items) - 1) / (most - 1))] for i in range(most)]
 
 
 def _mark_events(axes: Axes, run: Run) -> None:
@@ -190,7 +214,7 @@ def _looks(runs: Sequence[Run]) -> list[dict[str, Any]]:
     Where no run has packets, all take part in the sequence.
     """
     name, first, last = COLOURS
-    coloured = [bool(len(_counts(run))) for run in runs]
+    coloured = [bool(run.delays) for run in runs]
     if not any(coloured):
         coloured = [True] * len(runs)
     places = np.linspace(first, last, max(2, sum(coloured)))
@@ -211,18 +235,8 @@ def _legend_title(runs: Sequence[Run]) -> str | None:
     return "mean combined delay" if all(other == others[0] for other in others) else None
 
 
-def _counts(run: Run) -> pd.DataFrame:
-    """Return the histogram of a run's delays between its first and last arrivals."""
-    counts = run.table("delays")
-    if not len(counts) or not counts["count"].any():
-        return counts.iloc[:0]
-    filled = np.flatnonzero(counts["count"])
-    return counts.iloc[filled[0] : filled[-1] + 1]
-
-
 def _histogram(axes: Axes, run: Run, colour: Any) -> None:
-    counts = _counts(run)
-    heights, edges_ms = _rebinned(counts)
+    heights, edges_ms = _rebinned(run.delays)
     share = 100 * heights / heights.sum() / np.diff(edges_ms)
     axes.stairs(share, edges_ms, fill=True, color=colour)
     delay = run.summary()["delay"]
@@ -234,10 +248,10 @@ def _histogram(axes: Axes, run: Run, colour: Any) -> None:
     axes.locator_params(axis="x", nbins=5)
 
 
-def _rebinned(counts: pd.DataFrame) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _rebinned(counts: Columns) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return heights (n,) and edges in ms (n + 1,) with bins joined to at most `MOST_BARS`."""
-    joined = -(-len(counts) // MOST_BARS)
-    starts = np.arange(0, len(counts), joined)
-    heights = np.add.reduceat(counts["count"].to_numpy(dtype=np.float64), starts)
-    edges = 1e3 * np.append(counts["bin_low_s"].to_numpy()[starts], counts["bin_high_s"].iloc[-1])
+    bins = len(counts["count"])
+    starts = np.arange(0, bins, -(-bins // MOST_BARS))
+    heights = np.add.reduceat(counts["count"].astype(np.float64), starts)
+    edges = 1e3 * np.append(counts["bin_low_s"][starts], counts["bin_high_s"][-1])
     return heights, edges

@@ -1,16 +1,18 @@
 """Reads result folders: a run, or a sweep of runs; knows nothing of how they were made."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from numpy.typing import NDArray
+import numpy as np
 
+from tieline.columns import Columns, Tables
 from tieline.experiment.folder import FORMAT, MANIFEST, is_result, read_json, read_manifest
 from tieline.experiment.table_hash import table_hash
-from tieline.table_parts import row_count
-from tieline.tables import column_names, read_table, read_values, stored
+from tieline.tables import read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,7 +35,6 @@ __all__ = [
 SUMMARY = "summary.json"
 POINTS = "points"
 MAP = "map.json"
-_VALUES_AT_ONCE = 300_000
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ class Run:
 
     def path(self, name: str) -> Path | None:
         """Return the file of a table; None if it was not written."""
-        return stored(self.folder / f"{name}.parquet")
+        return self._tables.path(name)
 
     def table(self, name: str, *columns: str) -> "pd.DataFrame":
         """Return a table (`grid`, `flows`, ...), or some columns; no rows if it was not written."""
@@ -85,54 +86,59 @@ class Run:
 
         return pd.DataFrame()
 
-    def values(self, name: str, *columns: str) -> dict[str, NDArray[Any]]:
-        """Return a table's columns, or some, as arrays, NaN for null; none if it was not written.
+    def values(self, name: str, *columns: str) -> Columns:
+        """Return a table, or some columns, as arrays (rows,); nothing if it was not written."""
+        with self._tables.opened(name) as table:
+            return {} if table is None else table.read(columns or None)
 
-        Nothing is imported for it, so that what ends a run waits for nothing.
-        """
-        path = self.path(name)
-        return {} if path is None else read_values(path, columns or None)
-
-    def each(self, name: str, columns: Sequence[str]) -> Iterator[tuple[str, NDArray[Any]]]:
-        """Yield name and values of some columns of a table, as many read at a time as `blocks`."""
-        for some in self._at_once(name, columns):
-            yield from self.values(name, *some).items()
-
-    def blocks(self, name: str, columns: Sequence[str]) -> "Iterator[pd.DataFrame]":
+    def blocks(self, name: str, columns: Sequence[str]) -> Iterator[Columns]:
         """Yield some columns of a table that was written, as many at a time as are a few MB."""
-        for some in self._at_once(name, columns):
-            yield self.table(name, *some)
+        with self._tables.opened(name) as table:
+            if table is not None:
+                yield from table.blocks(columns)
 
     def columns(self, name: str) -> list[str]:
         """Return the names of a table's columns; none if it was not written."""
-        path = self.path(name)
-        return [] if path is None else column_names(path)
+        return self._tables.names(name)
 
     def events(self) -> list[tuple[float, str]]:
         """Return (instant in s, what happens) of each event, in order of time."""
-        log = self.values("events")
-        if not log:
-            return []
-        return [(float(t_s), str(what)) for t_s, what in zip(log["t_s"], log["what"], strict=True)]
+        return [(at_s, what) for at_s, what, _ in self._log]
 
     def ending(self) -> str | None:
         """Return why the run was over before its time, as a result; None if it was not."""
-        log = self.values("events")
-        if not log or not log["is_ending"].any():
-            return None
-        row = log["is_ending"].tolist().index(1)
-        return f"{log['what'][row]} at {log['t_s'][row]:.3f} s"
+        return next((f"{what} at {at_s:.3f} s" for at_s, what, ends in self._log if ends), None)
 
     def tripped_units(self) -> set[str]:
         """Return the units that an event trips; they go on alone and count in no average."""
         events = self.config["grid"]["events"]
         return {event["trip_generator"] for event in events if "trip_generator" in event}
 
-    def _at_once(self, name: str, columns: Sequence[str]) -> Iterator[Sequence[str]]:
-        path = self.path(name)
-        count = 1 if path is None else max(1, _VALUES_AT_ONCE // max(1, row_count(path)))
-        for first in range(0, len(columns), count):
-            yield columns[first : first + count]
+    @cached_property
+    def delays(self) -> Columns:
+        """The histogram of the delays between first and last arrivals; nothing without arrivals."""
+        counts = self.values("delays")
+        if not counts or not counts["count"].any():
+            return {}
+        filled = np.flatnonzero(counts["count"])
+        return {name: values[filled[0] : filled[-1] + 1] for name, values in counts.items()}
+
+    def kept_open(self) -> AbstractContextManager[None]:
+        """Open each table once for all that is read of it within a `with`."""
+        return self._tables.kept_open()
+
+    @cached_property
+    def _tables(self) -> Tables:
+        return Tables(self.folder)
+
+    @cached_property
+    def _log(self) -> list[tuple[float, str, bool]]:
+        """Instant in s, what happens, and whether the run ends with it."""
+        log = self.values("events")
+        if not log:
+            return []
+        rows = zip(log["t_s"], log["what"], log["is_ending"], strict=True)
+        return [(float(at_s), str(what), bool(ends)) for at_s, what, ends in rows]
 
 
 def common_events(runs: Sequence[Run]) -> list[tuple[float, str]]:

@@ -6,11 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tieline.columns import Columns
 from tieline.experiment.results import Run
 from tieline.experiment.ringdown import ring_down
-
-Table = Mapping[str, NDArray[Any]]
-"""Columns by name; none where the table was not written."""
 
 SETTLING_S = 5.0
 """The settling value is the mean over this long at the end of a run that lasts four times as long
@@ -32,6 +30,11 @@ def summarise(run: Run) -> dict[str, Any]:
     Raises:
         InputError: the run's files cannot be read.
     """
+    with run.kept_open():
+        return _summary(run)
+
+
+def _summary(run: Run) -> dict[str, Any]:
     # Never all of its columns at once: those of a long run take more memory than the run itself.
     grid = run.values("grid", "t_s", "coi_pu")
     told = run.told()
@@ -48,7 +51,7 @@ def summarise(run: Run) -> dict[str, Any]:
     }
 
 
-def _frequency(run: Run, grid: Table, nominal_hz: float) -> dict[str, Any]:
+def _frequency(run: Run, grid: Columns, nominal_hz: float) -> dict[str, Any]:
     """Nadir after the first event and settling value of the centre-of-inertia frequency."""
     time_s, frequency_hz = _values(grid, "t_s"), nominal_hz * _values(grid, "coi_pu")
     # The ending of a run without a future is logged last; nothing is recorded from it on.
@@ -68,7 +71,7 @@ def _frequency(run: Run, grid: Table, nominal_hz: float) -> dict[str, Any]:
     }
 
 
-def _swing(run: Run, grid: Table, tie_mode: Mapping[str, Any] | None) -> dict[str, Any]:
+def _swing(run: Run, grid: Columns, tie_mode: Mapping[str, Any] | None) -> dict[str, Any]:
     """Ring-down of the tie mode: one group of units against another, after the last event."""
     if tie_mode is None:
         return _no_swing("the case names no tie mode")
@@ -108,7 +111,8 @@ def _no_swing(reason: str | None) -> dict[str, Any]:
 
 def _mean_speed(run: Run, units: list[str]) -> NDArray[np.float64]:
     names = [f"speed_pu.{unit}" for unit in units]
-    return np.mean([values for _, values in run.each("grid", names)], axis=0)
+    blocks = run.blocks("grid", names)
+    return np.mean([_values(block, name) for block in blocks for name in block], axis=0)
 
 
 def _delay(run: Run) -> dict[str, Any]:
@@ -121,19 +125,19 @@ def _delay(run: Run) -> dict[str, Any]:
     delivered = _values(flows, "delivered") if flows else np.zeros(0)
     if not delivered.sum():
         return dict.fromkeys(("mean_s", "p50_s", "p95_s", "max_s", "jitter_s"))
-    arrived = {name: values[delivered > 0] for name, values in flows.items()}
-    weights = _values(arrived, "delivered")
-    jitter_s = _values(arrived, "jitter_s")
+    arrived = delivered > 0
+    weights = delivered[arrived]
+    jitter_s = np.nan_to_num(_values(flows, "jitter_s"))
     return {
-        "mean_s": float(np.average(arrived["delay_mean_s"], weights=weights)),
+        "mean_s": float(np.average(flows["delay_mean_s"][arrived], weights=weights)),
         "p50_s": _quantile(counts, 0.5),
         "p95_s": _quantile(counts, 0.95),
-        "max_s": float(arrived["delay_max_s"].max()),
-        "jitter_s": float(np.average(np.where(np.isnan(jitter_s), 0.0, jitter_s), weights=weights)),
+        "max_s": float(np.nanmax(flows["delay_max_s"][arrived])),
+        "jitter_s": float(np.average(jitter_s[arrived], weights=weights)),
     }
 
 
-def _quantile(counts: Table, share: float) -> float | None:
+def _quantile(counts: Columns, share: float) -> float | None:
     """Return a quantile from the histogram, linear within a bin."""
     if not counts or not counts["count"].sum():
         return None
@@ -145,7 +149,7 @@ def _quantile(counts: Table, share: float) -> float | None:
     return float(low + within * (high - low))
 
 
-def _packets(flows: Table) -> dict[str, Any]:
+def _packets(flows: Columns) -> dict[str, Any]:
     names = ("sent", "delivered", "dropped_queue", "dropped_loss", "dropped_down", "in_flight")
     totals = {name: int(flows[name].sum()) if name in flows else 0 for name in names}
     lost = totals["dropped_queue"] + totals["dropped_loss"] + totals["dropped_down"]
@@ -159,8 +163,9 @@ def _age(run: Run) -> dict[str, Any]:
     prefix = "age_s."
     names = [name for name in run.columns("grid") if name.startswith(prefix)]
     means = {
-        column.removeprefix(prefix): float(np.nansum(values) / np.count_nonzero(~np.isnan(values)))
-        for column, values in run.each("grid", names)
+        column.removeprefix(prefix): float(np.nanmean(values))
+        for block in run.blocks("grid", names)
+        for column, values in block.items()
         if not np.isnan(values).all()
     }
     mean = float(np.mean(list(means.values()))) if means else None
@@ -174,10 +179,14 @@ def _lowest_voltage(run: Run) -> dict[str, Any] | None:
     names = [name for name in run.columns("grid") if name.startswith(prefix) and name not in lost]
     if not names:
         return None
-    lowest = {name: float(np.nanmin(values)) for name, values in run.each("grid", names)}
+    lowest = {
+        name: float(np.fmin.reduce(values))
+        for block in run.blocks("grid", names)
+        for name, values in block.items()
+    }
     column = min(lowest, key=lambda name: lowest[name])
     of_it = run.values("grid", "t_s", column)
-    row = int(np.nanargmin(of_it[column]))
+    row = int(np.nanargmin(_values(of_it, column)))
     return {
         "unit": column.removeprefix(prefix),
         "vt_pu": lowest[column],
@@ -185,5 +194,5 @@ def _lowest_voltage(run: Run) -> dict[str, Any] | None:
     }
 
 
-def _values(table: Table, column: str) -> NDArray[np.float64]:
-    return np.asarray(table[column], dtype=np.float64)
+def _values(table: Columns, column: str) -> NDArray[np.float64]:
+    return table[column].astype(np.float64)

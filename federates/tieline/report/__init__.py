@@ -10,7 +10,7 @@ from tieline.report.sweep_page import write_sweep_page
 MOST_PAGES = 24
 """Points of a sweep that get a page of their own; of more, one asks for those that matter."""
 
-__all__ = ["PAGE", "write_pages"]
+__all__ = ["PAGE", "write_page", "write_pages", "write_point_pages"]
 
 
 def write_pages(folder: Path, unit: str | None = None) -> Path:
@@ -23,13 +23,38 @@ def write_pages(folder: Path, unit: str | None = None) -> Path:
     Raises:
         InputError: the folder is no result, or a file of it cannot be read.
     """
+    write_point_pages(folder)
+    return write_page(folder, unit)
+
+
+def write_point_pages(folder: Path) -> None:
+    """Write the pages of the points of a sweep, if it is one; nothing else need be there.
+
+    Raises:
+        InputError: as `write_pages`.
+    """
+    if read_manifest(folder)["kind"] == "run":
+        return
+    for run in read_runs(folder)[:MOST_PAGES]:
+        if run.is_complete:
+            write_run_page(run, f"../../{PAGE}")
+
+
+def write_page(folder: Path, unit: str | None = None) -> Path:
+    """Write the page of a whole result, and return it.
+
+    It has links to the figures and to the pages of points that are there.
+
+    Args:
+        folder, unit: as those of `write_pages`.
+
+    Raises:
+        InputError: as `write_pages`.
+    """
     runs = read_runs(folder)
     manifest = read_manifest(folder)
     if manifest["kind"] == "run":
         return write_run_page(runs[0], _sweep_of(runs[0]))
-    for run in runs[:MOST_PAGES]:
-        if run.is_complete:
-            write_run_page(run, f"../../{PAGE}")
     return write_sweep_page(folder, manifest, runs, unit)
 
 

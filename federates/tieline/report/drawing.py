@@ -47,7 +47,7 @@ def _put_voltages(store: Store, run: Run, found: Mapping[str, Any]) -> None:
     buses = [f"B{station['bus']}" for station in found["stations"]]
     names = [f"v_pu.{bus}" for bus in buses]
     if names and set(names) <= set(run.columns("grid")):
-        time_s = run.table("grid", "t_s")["t_s"].to_numpy(dtype=np.float64)
+        time_s = run.values("grid", "t_s")["t_s"]
         blocks = run.blocks("grid", list(dict.fromkeys(names)))
         found_rows = {
             bus: row

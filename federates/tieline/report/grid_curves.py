@@ -15,11 +15,11 @@ LATER = "Hidden at first: {}, which the disturbance trips and which goes on alon
 
 def put_grid(store: Store, run: Run) -> None:
     """Add what `grid.parquet` of a run holds to a page."""
-    grid, interconnection = run.table("grid", "t_s", "coi_pu"), run.map()
-    time_s = grid["t_s"].to_numpy(dtype=np.float64)
+    grid, interconnection = run.values("grid", "t_s", "coi_pu"), run.map()
+    time_s = grid["t_s"]
     nominal_hz = float(run.told()["frequency_hz"])
     unit_areas, bus_areas = areas_of(interconnection)
-    coi_hz = nominal_hz * grid["coi_pu"].to_numpy(dtype=np.float64)
+    coi_hz = nominal_hz * grid["coi_pu"]
     store.put("coi", "grid", time_s, [coi_hz])
     put = _Putter(store, run, time_s, unit_areas, bus_areas, run.tripped_units())
     put.units("speed", "speed_pu", nominal_hz)

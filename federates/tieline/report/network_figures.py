@@ -6,11 +6,12 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from tieline.batches import values_of
+from tieline.columns import TableFile
 from tieline.errors import InputError
-from tieline.figures import PANEL_INCHES, STYLE, colours, save
+from tieline.figures import PANEL_INCHES, STYLE, PanelFigure, colours, save
 from tieline.report.packing import thinned
 from tieline.report.windowed import Floats, Windowed
-from tieline.table_parts import parts
 
 PANELS = 3
 LINKS = 4
@@ -43,19 +44,14 @@ def draw(folder: Path, plots: Path | None = None) -> list[Path]:
         return save(folder / "plots" if plots is None else plots, figures)
 
 
-def network_plots(folder: Path) -> list[Path]:
-    """Return the files that `draw` has made in a run's folder `plots`."""
-    names = ("controller_delay", "controller_age", "busiest_links")
-    paths = [folder / "plots" / f"{name}.png" for name in names]
-    return [path for path in paths if path.is_file()]
-
-
 def has_series(folder: Path) -> bool:
     """Return whether a run's folder holds the series that `draw` needs, with any packet in them."""
     paths = [folder / f"{name}.parquet" for name in ("controller_series", "link_series")]
-    return all(path.is_file() for path in paths) and any(
-        part.column("delivered").to_numpy().any() for part in parts(paths[0], ["delivered"])
-    )
+    if not all(path.is_file() for path in paths):
+        return False
+    with TableFile(paths[0]) as table:
+        delivered = table.parts(["delivered"])
+        return any(values_of(part.column("delivered")).any() for part in delivered)
 
 
 def controller_delays(series: Windowed) -> Figure:
@@ -104,8 +100,8 @@ def busiest_links(series: Windowed, count: int = LINKS) -> Figure:
 
     so_far = np.cumsum(sum((read(column) for column in DROPS), np.zeros(())), axis=1)
     quantities = (100 * read("utilisation"), read("max_queue"), so_far)
-    figure = Figure(figsize=(PANEL_INCHES[0], 6.6), layout="constrained")
-    panels = figure.subplots(3, 1, sharex=True)
+    figure = PanelFigure((PANEL_INCHES[0], 6.6), 3, sharex=True)
+    panels = figure.axes
     styles = ("default", "steps-pre", "default")
     for axes, quantity, style in zip(panels, quantities, styles, strict=True):
         at_s, rows = thinned(series.windows, quantity, MOST_POINTS)
@@ -120,7 +116,7 @@ def busiest_links(series: Windowed, count: int = LINKS) -> Figure:
         axes.set_ylim(bottom=0)
     panels[0].set_ylim(0, 105)
     panels[2].set_xlabel("time, s")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="lower center", ncols=2)
     return figure
 
 
@@ -130,15 +126,14 @@ def _bands(series: Windowed, line: str, edges: tuple[str, str], legend: str) -> 
     known = np.flatnonzero(~np.isnan(lines_ms).all(axis=1))
     ranks = known[np.argsort(-np.nanmean(lines_ms[known], axis=1), kind="stable")]
     places = np.linspace(0, len(ranks) - 1, min(PANELS, len(ranks))).round().astype(int)
-    figure = Figure(figsize=PANEL_INCHES, layout="constrained")
-    panels = figure.subplots(1, max(1, len(places)), sharey=True, squeeze=False)[0]
+    figure = PanelFigure(PANEL_INCHES, columns=max(1, len(places)), sharey=True)
     at_s, lines_ms = thinned(series.windows, lines_ms[ranks], MOST_POINTS)
     low_ms, high_ms = (
         thinned(series.windows, edge[ranks], MOST_POINTS)[1] for edge in (low_ms, high_ms)
     )
     is_wide = len(ranks) and np.nanmax([lines_ms, high_ms]) > WIDE * np.nanmin(lines_ms)
     everyone = _end_to_end(at_s, lines_ms)
-    for axes, i, colour in zip(panels, places, colours(len(places)), strict=False):
+    for axes, i, colour in zip(figure.axes, places, colours(len(places)), strict=False):
         axes.plot(*everyone, color="0.8", linewidth=0.4)
         axes.fill_between(
             at_s, low_ms[i], high_ms[i], color=colour, alpha=0.35, linewidth=0, zorder=3

@@ -73,26 +73,34 @@ def packed(rows: Floats) -> dict[str, Any]:
         rows: (n, m) curves; NaN where there is no value.
     """
     rows = np.asarray(rows, np.float64)
-    steps = np.zeros(rows.shape, "<u2")
-    # Row by row: all of them would take several times their size at once.
-    scales = [_steps(row, into) for row, into in zip(rows, steps, strict=True)]
-    planes = steps.view(np.uint8).reshape(-1, 2).T
+    differences = np.zeros(rows.shape, "<u2")
+    lows, steps = np.zeros(len(rows)), np.ones(len(rows))
+    # A few rows at a time: what it takes beside them is several times their size.
+    at_once = max(1, _VALUES_AT_ONCE // max(1, rows.shape[1]))
+    for i in range(0, len(rows), at_once):
+        some = slice(i, i + at_once)
+        codes, lows[some], steps[some] = _codes(rows[some])
+        differences[some] = np.diff(codes, axis=1, prepend=np.zeros((len(codes), 1), np.uint16))
+    planes = differences.view(np.uint8).reshape(-1, 2).T
     return {
         "rows": rows.shape[0],
         "length": rows.shape[1],
-        "low": [low for low, _ in scales],
-        "step": [step for _, step in scales],
+        "low": lows.tolist(),
+        "step": steps.tolist(),
         "data": base64.b64encode(zlib.compress(planes.tobytes(), 6)).decode(),
     }
 
 
-def _steps(row: Floats, into: NDArray[np.uint16]) -> tuple[float, float]:
-    """Write the differences of a curve's codes; return the value of code 0, and that of a step."""
-    values = row[~np.isnan(row)]
-    low = float(values.min()) if values.size else 0.0
-    span = float(values.max()) - low if values.size else 0.0
-    is_whole = bool(np.all(values == np.round(values))) and span < MISSING
-    step = 1.0 if is_whole or span == 0.0 else span / (MISSING - 1)
-    codes = np.where(np.isnan(row), MISSING, np.round((row - low) / step)).astype(np.uint16)
-    into[:] = np.diff(codes, prepend=np.zeros(1, np.uint16))
-    return low, step
+def _codes(rows: Floats) -> tuple[NDArray[np.uint16], Floats, Floats]:
+    """Return the codes (n, m) of some curves, the value (n,) of code 0 and that (n,) of a step."""
+    missing = np.isnan(rows)
+    is_known = ~missing.all(axis=1)
+    low, high = (
+        np.where(is_known, least.reduce(rows, axis=1, initial=np.nan), 0.0)
+        for least in (np.fmin, np.fmax)
+    )
+    span = high - low
+    is_whole = (missing | (rows == np.round(rows))).all(axis=1) & (span < MISSING)
+    step = np.where(is_whole | (span == 0.0), 1.0, span / (MISSING - 1))
+    codes = np.round((rows - low[:, None]) / step[:, None])
+    return np.where(missing, MISSING, codes).astype(np.uint16), low, step

@@ -27,9 +27,14 @@ def write_run_page(run: Run, sweep: str | None = None) -> Path:
         run: complete, or as far as it came; without a grid the page has no curves.
         sweep: the page of the sweep that it is a point of, as seen from its folder.
     """
+    with run.kept_open():
+        return _written(run, sweep)
+
+
+def _written(run: Run, sweep: str | None) -> Path:
     store = Store()
     drawn = None
-    if run.columns("grid") and len(run.table("grid", "t_s")):
+    if run.columns("grid") and len(run.values("grid", "t_s")["t_s"]):
         put_grid(store, run)
         put_traffic(store, run)
         drawn = drawing(store, run)
@@ -54,8 +59,8 @@ def write_run_page(run: Run, sweep: str | None = None) -> Path:
     if grid:
         drawn_there = charts([chart.name for chart in grid])
         sections.append(("curves", "Grid and controllers", Html(note(ROUNDING) + drawn_there)))
-    tables = links_table(run.table("links")) + controllers_table(
-        run.table("flows"), run.table("ages")
+    tables = links_table(run.values("links")) + controllers_table(
+        run.values("flows"), run.values("ages")
     )
     drawn_there = charts([chart.name for chart in network])
     sections.append(("network", "Network", Html(drawn_there + tables)))

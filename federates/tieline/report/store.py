@@ -1,13 +1,13 @@
 """Gathers what the scripts of a page draw: curves over common axes, and charts of them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
+from tieline.columns import Columns
 from tieline.report.packing import packed, thinned
 
 Floats = NDArray[np.float64]
@@ -86,20 +86,22 @@ class Store:
 
     def data(self) -> dict[str, Any]:
         """Return all of it as plain data."""
-        charts = [asdict(chart) for chart in self.charts]
+        charts = [
+            vars(chart) | {"curves": [vars(curve) for curve in chart.curves]}
+            for chart in self.charts
+        ]
         return {"axes": self.axes, "tables": self.tables, "charts": charts}
 
 
-def columns_of(table: pd.DataFrame, quantity: str) -> list[str]:
+def columns_of(table: Columns, quantity: str) -> list[str]:
     """Return the elements (`G26`, `B61`) that a table has a quantity of, in its order."""
     prefix = f"{quantity}."
-    return [name.removeprefix(prefix) for name in table.columns if name.startswith(prefix)]
+    return [name.removeprefix(prefix) for name in table if name.startswith(prefix)]
 
 
-def rows_of(table: pd.DataFrame, quantity: str, elements: Sequence[str]) -> Floats:
+def rows_of(table: Columns, quantity: str, elements: Sequence[str]) -> Floats:
     """Return (n, m) a quantity of some elements, NaN where there is no value."""
-    names = [f"{quantity}.{element}" for element in elements]
-    return np.ascontiguousarray(table[names].to_numpy(dtype=np.float64).T)
+    return np.array([table[f"{quantity}.{element}"] for element in elements], np.float64)
 
 
 def area_name(area: str) -> str:

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
+from tieline.columns import Columns
 from tieline.experiment.results import POINTS, Run, common_events
 from tieline.report import facts
 from tieline.report.html import Html, details
@@ -17,7 +17,7 @@ from tieline.report.store import Chart, Curve, Floats, Store, columns_of
 QUANTILES = 200
 """Points of a curve of the delays reached, at most."""
 
-Point = tuple[Run, pd.DataFrame]
+Point = tuple[Run, Columns]
 
 
 def write_sweep_page(
@@ -89,12 +89,12 @@ def _put_over_time(store: Store, runs: Sequence[Run], unit: str | None) -> None:
     _put(store, points, "age", "Age of the PMU data", "age, ms", _age, "Mean of all controllers.")
 
 
-def _grid(run: Run, unit: str | None) -> pd.DataFrame:
+def _grid(run: Run, unit: str | None) -> Columns:
     """Return the columns of a run's grid that the page compares."""
     quantities = ("speed_pu", "vt_pu", "wbar_pu", "vs_pu")
     wanted = {"t_s", "coi_pu", *(f"{quantity}.{unit}" for quantity in quantities)}
     names = [n for n in run.columns("grid") if n in wanted or n.startswith("age_s.")]
-    return run.table("grid", *names)
+    return run.values("grid", *names)
 
 
 def _put(
@@ -103,7 +103,7 @@ def _put(
     name: str,
     title: str,
     y: str,
-    values: Callable[[Run, pd.DataFrame], Floats | None],
+    values: Callable[[Run, Columns], Floats | None],
     note: str = "",
 ) -> None:
     """Add one curve a run over the instants of the longest; an earlier end leaves a gap."""
@@ -120,36 +120,45 @@ def _put(
         store.charts.append(Chart(name, title, y, curves, note, from_zero=name == "age"))
 
 
-def _times(grid: pd.DataFrame) -> Floats:
-    return grid["t_s"].to_numpy(dtype=np.float64)
+def _times(grid: Columns) -> Floats:
+    return grid["t_s"]
 
 
 def _nominal(run: Run) -> float:
     return float(run.told()["frequency_hz"])
 
 
-def _coi(run: Run, grid: pd.DataFrame) -> Floats | None:
+def _coi(run: Run, grid: Columns) -> Floats | None:
     return _scaled(grid, "coi_pu", _nominal(run))
 
 
-def _error(run: Run, grid: pd.DataFrame, unit: str) -> Floats | None:
+def _error(run: Run, grid: Columns, unit: str) -> Floats | None:
     believed = _scaled(grid, f"wbar_pu.{unit}", 1e3 * _nominal(run))
     true = _scaled(grid, "coi_pu", 1e3 * _nominal(run))
     return None if believed is None or true is None else believed - true
 
 
-def _age(run: Run, grid: pd.DataFrame) -> Floats | None:
+def _age(run: Run, grid: Columns) -> Floats | None:
     names = [f"age_s.{unit}" for unit in columns_of(grid, "age_s")]
-    return 1e3 * grid[names].mean(axis=1).to_numpy(dtype=np.float64) if names else None
+    return 1e3 * _mean(np.array([grid[name] for name in names])) if names else None
 
 
-def _scaled(grid: pd.DataFrame, column: str, factor: float = 1.0) -> Floats | None:
-    return factor * grid[column].to_numpy(dtype=np.float64) if column in grid else None
+def _mean(rows: Floats) -> Floats:
+    """Return the mean (m,) of those of some rows (n, m) that have a value; NaN where none has."""
+    known = ~np.isnan(rows)
+    sums = np.where(known, rows, 0.0).sum(axis=0)
+    return np.divide(
+        sums, known.sum(axis=0), out=np.full(len(sums), np.nan), where=known.any(axis=0)
+    )
+
+
+def _scaled(grid: Columns, column: str, factor: float = 1.0) -> Floats | None:
+    return factor * grid[column] if column in grid else None
 
 
 def _put_delays(store: Store, runs: Sequence[Run]) -> None:
     """Add the share of packets that arrived within a delay, over the delays of all runs."""
-    reached = {run.label: _reached(run.table("delays"), len(runs)) for run in runs}
+    reached = {run.label: _reached(run.delays, len(runs)) for run in runs}
     found = {label: curve for label, curve in reached.items() if curve is not None}
     if not found:
         return
@@ -163,12 +172,12 @@ def _put_delays(store: Store, runs: Sequence[Run]) -> None:
     )  # fmt: skip
 
 
-def _reached(counts: pd.DataFrame, runs: int) -> tuple[Floats, Floats] | None:
+def _reached(counts: Columns, runs: int) -> tuple[Floats, Floats] | None:
     """Return (edges in ms, % that arrived within) at a few hundred quantiles, or None."""
-    if counts.empty or not counts["count"].any():
+    if not counts:
         return None
-    edges = np.append(counts["bin_low_s"].to_numpy()[:1], counts["bin_high_s"].to_numpy())
-    share = np.concatenate([[0.0], np.cumsum(counts["count"].to_numpy(dtype=np.float64))])
+    edges = np.append(counts["bin_low_s"][:1], counts["bin_high_s"])
+    share = np.concatenate([[0.0], np.cumsum(counts["count"].astype(np.float64))])
     share *= 100 / share[-1]
     levels = np.linspace(0, 100, max(20, min(QUANTILES, 4000 // runs)))
     kept = np.unique(np.searchsorted(share, levels).clip(0, len(share) - 1))

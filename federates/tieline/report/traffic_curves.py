@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-import pandas as pd
 
+from tieline.columns import Columns
 from tieline.experiment.results import Run
 from tieline.report.store import Chart, Curve, Floats, Store, areas_of
 from tieline.report.windowed import Windowed
@@ -21,7 +21,7 @@ def put_traffic(store: Store, run: Run) -> None:
     # Links that carried nothing have no row: their windows are known from the controllers.
     windows = np.union1d(controllers.windows, links.windows)
     _put_controllers(store, run, controllers, windows)
-    _put_distribution(store, run.table("delays"))
+    _put_distribution(store, run.delays)
     _put_links(store, links, windows)
 
 
@@ -44,8 +44,8 @@ def _put_controllers(store: Store, run: Run, series: Windowed, windows: Floats) 
     )  # fmt: skip
 
 
-def _put_distribution(store: Store, counts: pd.DataFrame) -> None:
-    if counts.empty or not counts["count"].any():
+def _put_distribution(store: Store, counts: Columns) -> None:
+    if not counts:
         return
     edges_ms, share = _rebinned(counts)
     middles_ms = (edges_ms[1:] + edges_ms[:-1]) / 2
@@ -64,14 +64,12 @@ def _put_distribution(store: Store, counts: pd.DataFrame) -> None:
     )  # fmt: skip
 
 
-def _rebinned(counts: pd.DataFrame) -> tuple[Floats, Floats]:
+def _rebinned(counts: Columns) -> tuple[Floats, Floats]:
     """Return edges (n + 1,) in ms and the share (n,) in % of at most `MOST_BARS` bins."""
-    filled = np.flatnonzero(counts["count"])
-    counts = counts.iloc[filled[0] : filled[-1] + 1]
-    joined = -(-len(counts) // MOST_BARS)
-    starts = np.arange(0, len(counts), joined)
-    heights = np.add.reduceat(counts["count"].to_numpy(dtype=np.float64), starts)
-    edges = np.append(counts["bin_low_s"].to_numpy()[starts], counts["bin_high_s"].iloc[-1])
+    bins = len(counts["count"])
+    starts = np.arange(0, bins, -(-bins // MOST_BARS))
+    heights = np.add.reduceat(counts["count"].astype(np.float64), starts)
+    edges = np.append(counts["bin_low_s"][starts], counts["bin_high_s"][-1])
     return 1e3 * edges, 100 * heights / heights.sum()
 
 

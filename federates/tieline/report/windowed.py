@@ -11,7 +11,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from tieline.table_parts import parts
+from tieline.batches import values_of
+from tieline.columns import TableFile
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int32]
@@ -19,6 +20,8 @@ Integers = NDArray[np.int32]
 
 class Windowed:
     """A table with an instant `t_s` and keys in each row, one quantity of which is read at a time.
+
+    It stays open as long as it is used.
 
     Args:
         path: the table; None is one without rows.
@@ -30,7 +33,7 @@ class Windowed:
     """
 
     def __init__(self, path: Path | None, *keys: str) -> None:
-        self._path = path
+        self._table = None if path is None else TableFile(path)
         self.keys: list[tuple[str, ...]] = []
         numbers: dict[tuple[str, ...], int] = {}
         found = [(_instants(part), _numbered(part, keys, numbers)) for part in self._parts(*keys)]
@@ -66,23 +69,23 @@ class Windowed:
         for part, keys, at in zip(self._parts(column), self._keys, self._at, strict=True):
             rows = row_of[keys]
             here = rows >= 0
-            values[rows[here], own[at[here]]] = part.column(column).to_numpy()[here]
+            values[rows[here], own[at[here]]] = values_of(part.column(column))[here]
         return values
 
     def totals(self, column: str) -> Floats:
         """Return the sum (n,) of a quantity over all windows, for each key."""
         sums = np.zeros(len(self.keys))
         for part, keys in zip(self._parts(column), self._keys, strict=True):
-            sums += np.bincount(keys, part.column(column).to_numpy(), len(sums))
+            sums += np.bincount(keys, values_of(part.column(column)), len(sums))
         return sums
 
     def _parts(self, *columns: str) -> Iterator[pa.Table]:
-        if self._path is not None:
-            yield from parts(self._path, ("t_s", *columns))
+        if self._table is not None:
+            yield from self._table.parts(("t_s", *columns))
 
 
 def _instants(part: pa.Table) -> Floats:
-    return np.asarray(part.column("t_s").to_numpy(), np.float64)
+    return np.asarray(values_of(part.column("t_s")), np.float64)
 
 
 def _numbered(part: pa.Table, keys: Sequence[str], numbers: dict[tuple[str, ...], int]) -> Integers:
@@ -90,7 +93,9 @@ def _numbered(part: pa.Table, keys: Sequence[str], numbers: dict[tuple[str, ...]
     encoded = [part.column(key).combine_chunks().dictionary_encode() for key in keys]
     texts = [one.dictionary.to_pylist() for one in encoded]
     shape = tuple(max(1, len(text)) for text in texts)
-    codes = np.ravel_multi_index([one.indices.to_numpy() for one in encoded], shape)
+    codes = np.ravel_multi_index(
+        [values_of(pa.chunked_array([one.indices])) for one in encoded], shape
+    )
     distinct, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
     number_of = np.zeros(len(distinct), np.int32)
     for which in np.argsort(first):

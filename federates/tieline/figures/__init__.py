@@ -5,9 +5,22 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+
+from tieline.figures.both import Both, BothCanvas
+from tieline.figures.panels import Panel, PanelFigure
+from tieline.figures.png import write_png
+from tieline.figures.scales import POINTS_PER_INCH
+
+__all__ = [
+    "COLOURS",
+    "PANEL_INCHES",
+    "STYLE",
+    "Panel",
+    "PanelFigure",
+    "colours",
+    "save",
+]
 
 STYLE: Any = {
     "font.size": 9.0,
@@ -43,27 +56,21 @@ def save(folder: Path, figures: Mapping[str, Figure]) -> list[Path]:
     """Write figures as PNG and SVG into a folder, made if missing, and return the PNG files.
 
     An SVG has letters as text, so that a paper's own typeface can replace them, and no date, so
-    that the same figure is the same file. Both have the layout of the PNG.
+    that the same figure is the same file. Both have one layout and are drawn at once.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    paths = []
-    for name, figure in figures.items():
-        paths.append(folder / f"{name}.png")
-        pixels = _laid_out(figure)
-        pixels.print_png(paths[-1])
-        FigureCanvasSVG(figure).print_svg(folder / f"{name}.svg", metadata={"Date": None})
+    paths = [folder / f"{name}.png" for name in figures]
+    for path, figure in zip(paths, figures.values(), strict=True):
+        _draw(figure, path)
     return paths
 
 
-def _laid_out(figure: Figure) -> FigureCanvasAgg:
-    """Return a figure's pixels to be, its layout found once and for all.
-
-    `savefig` would find it anew for each file, and draw once for nothing.
-    """
-    figure.set_dpi(mpl.rcParams["savefig.dpi"])
-    canvas = FigureCanvasAgg(figure)
-    engine = figure.get_layout_engine()
-    if engine is not None:
-        engine.execute(figure)
-        figure.set_layout_engine("none")
-    return canvas
+def _draw(figure: Figure, path: Path) -> None:
+    dots_per_inch = mpl.rcParams["savefig.dpi"]
+    figure.set_dpi(POINTS_PER_INCH)
+    with path.with_suffix(".svg").open("w", encoding="utf-8") as svg:
+        renderer = Both(figure, dots_per_inch, svg)
+        BothCanvas(figure, renderer)
+        figure.draw(renderer)
+        renderer.finish()
+    write_png(path, renderer.pixels(), dots_per_inch)
