@@ -23,7 +23,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from figures import Row, save
-
 from tieline.cosim.interfaces import GRID, NETWORK, Clock, OpenParticipant, Participant
 from tieline.cosim.local import run_local
 from tieline.experiment.load import load_experiment

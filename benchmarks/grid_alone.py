@@ -17,9 +17,9 @@ from statistics import median
 
 import numba
 import numpy as np
-from figures import Row, save
 from like_case import like_case
 
+from figures import Row, save
 from tieline.grid.equations import rhs
 from tieline.grid.system import System
 

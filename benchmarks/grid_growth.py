@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+
 from figures import Row, save
 
 TILES = (1, 2, 4, 8, 16, 32)

@@ -19,9 +19,9 @@ from pathlib import Path  # noqa: E402
 from statistics import median  # noqa: E402
 
 import numpy as np  # noqa: E402
-from figures import Row, save  # noqa: E402
 from scipy.linalg import eig  # noqa: E402
 
+from figures import Row, save  # noqa: E402
 from tieline.grid.case import load_case  # noqa: E402
 from tieline.grid.system import System  # noqa: E402
 from tieline.grid.tile import tiled  # noqa: E402

@@ -20,9 +20,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from figures import Row, save
 from numpy.typing import NDArray
 
+from figures import Row, save
 from tieline.network.packet import PacketEngine
 from tieline.network.packet.memory import HEAP_SIZE
 from tieline.network.queues import DropTail

@@ -24,7 +24,6 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
 
 from figures import Row, save  # noqa: E402
-
 from network.test_ns3_reference import PMUS, wide_area_network  # noqa: E402
 from tieline.network.engine import Engine  # noqa: E402
 from tieline.network.packet import PacketEngine  # noqa: E402

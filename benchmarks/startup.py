@@ -78,6 +78,8 @@ def measured(folder: Path, repeat: int, cold: int) -> list[Row]:
     firsts = []
     environment = dict(os.environ)
     environment.pop("NUMBA_CACHE_DIR", None)
+    # Where nobody turned that off, Python keeps the bytecode of what it has imported once.
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     for number in range(cold):
         environment["XDG_CACHE_HOME"] = str(folder / f"cache{number}")
         firsts.append(once((*SHORT, "--out", str(folder / f"first{number}")), environment))

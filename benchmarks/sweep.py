@@ -11,8 +11,9 @@ import os
 import tempfile
 from pathlib import Path
 
-from figures import Row, save
 from startup import Sample, once
+
+from figures import Row, save
 
 SETTINGS = ("grid.duration=4 s", "grid.events=[{at: 1 s, trip_generator: G26}]")
 

@@ -141,3 +141,8 @@ def fake_launch(folder: Path, on_progress: Callable[[Progress], None]) -> Outcom
     for share in (0.5, 1.0):
         on_progress(Progress(GRID, "running", 1, int(share * duration_s * 1e9)))
     return outcome(duration_s)
+
+
+def nothing_drawn(folder: Path) -> tuple[Path, list[Path]]:
+    """Stand in for what draws: say which page and figures there would be."""
+    return folder / "report.html", [folder / "plots" / "overview.png"]

@@ -7,12 +7,11 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import tieline
-from synthetic_result import CONSTANT, EXPERIMENT, SWEEP, fake_launch, known_sites
+from synthetic_result import CONSTANT, EXPERIMENT, SWEEP, fake_launch, known_sites, nothing_drawn
 from tieline import cli
 from tieline.cli import run as run_command
 from tieline.errors import CosimError
-from tieline.experiment import plan
-from tieline.experiment import report as experiment_report
+from tieline.experiment import artist, plan
 from tieline.experiment.results import read_manifest
 from tieline.experiment.sweep_run import InTurn
 
@@ -24,6 +23,7 @@ def _no_federation(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Stand in for case, network and launcher; each test works in a folder of its own."""
     monkeypatch.setattr(plan.prepare, "__defaults__", (known_sites,))
     monkeypatch.setattr(run_command, "launcher", lambda: fake_launch)
+    monkeypatch.setattr(run_command, "steps", lambda core: ((), ()))
     monkeypatch.setattr(run_command, "sweep_runner", lambda *_: InTurn(fake_launch))
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.chdir(tmp_path)
@@ -39,7 +39,7 @@ def call(*arguments: str) -> Result:
 @pytest.fixture
 def _no_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the figures, which take seconds and have tests of their own."""
-    monkeypatch.setattr(experiment_report, "draw", lambda folder, runs: [folder / "overview.png"])
+    monkeypatch.setattr(artist, "_what_draws", lambda: nothing_drawn)
 
 
 def test_a_run_ends_with_table_and_plots() -> None:

@@ -8,14 +8,13 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from synthetic_result import CONSTANT, EXPERIMENT, SWEEP, fake_launch, known_sites
+from synthetic_result import CONSTANT, EXPERIMENT, SWEEP, fake_launch, known_sites, nothing_drawn
 from tieline import cli, doctor
 from tieline.cli import run as run_command
 from tieline.cli.options import shipped_names
 from tieline.doctor import Finding
 from tieline.errors import CosimError
-from tieline.experiment import plan
-from tieline.experiment import report as experiment_report
+from tieline.experiment import artist, plan
 from tieline.experiment.results import read_manifest
 from tieline.experiment.sweep_run import InTurn
 from tieline.sweeps import start
@@ -29,8 +28,9 @@ def _no_federation(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Stand in for case, network, launcher and figures; each test works in a folder of its own."""
     monkeypatch.setattr(plan.prepare, "__defaults__", (known_sites,))
     monkeypatch.setattr(run_command, "launcher", lambda: fake_launch)
+    monkeypatch.setattr(run_command, "steps", lambda core: ((), ()))
     monkeypatch.setattr(run_command, "sweep_runner", lambda *_: InTurn(fake_launch))
-    monkeypatch.setattr(experiment_report, "draw", lambda folder, runs: [folder / "overview.png"])
+    monkeypatch.setattr(artist, "_what_draws", lambda: nothing_drawn)
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.chdir(tmp_path)
     Path("tiny.yaml").write_text(EXPERIMENT)

@@ -79,7 +79,7 @@ def test_only_the_cluster_needs_dask() -> None:
             ), path
 
 
-@pytest.mark.parametrize("name", ["report", "plots", "summary", "table"])
+@pytest.mark.parametrize("name", ["artist", "drawn", "plots", "report", "summary", "table"])
 def test_what_reports_reads_result_folders_only(name: str) -> None:
     """A report that reached into a simulation could show what no folder holds."""
     names = imports(ROOT / "experiment" / f"{name}.py")
@@ -168,6 +168,11 @@ def test_a_packet_is_looked_up_without_grid_and_federation() -> None:
         assert not begins(imports(path), *forbidden), path
 
 
+READY = (
+    "import tieline.experiment.run, tieline.experiment.report;"
+    "from tieline.sweeps.single import shared_steps, own_steps;"
+    "[step() for step in (*shared_steps(), *own_steps('zmq'))]"
+)
 LARGE = {"numba", "llvmlite", "matplotlib", "pandas", "pyarrow", "scipy", "networkx", "helics"}
 
 
@@ -176,9 +181,9 @@ LARGE = {"numba", "llvmlite", "matplotlib", "pandas", "pyarrow", "scipy", "netwo
     [
         ("import tieline.cli", LARGE | {"numpy", "pydantic", "yaml", "rich"}),
         ("from tieline.experiment.load import load_experiment as l; l('g26_trip')", LARGE),
-        ("import tieline.network.federate, tieline.grid.federate", {"pandas", "matplotlib"}),
+        (READY, {"pandas", "matplotlib", "networkx"}),
     ],
-    ids=["the command line", "a checked experiment", "the federates"],
+    ids=["the command line", "a checked experiment", "a launcher with its federates"],
 )
 def test_nothing_large_is_imported_before_it_is_used(script: str, forbidden: set[str]) -> None:
     """Help and a mistake in a file would come seconds late, and every federate start so."""

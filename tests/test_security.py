@@ -29,7 +29,7 @@ LOADS_CODE = {
 }
 """What may turn data into code, how, and from where."""
 OWN_MODULES = {"__init__.py", "grid/models/registry.py", "wams/__init__.py"}
-OWN_MODULES |= {"sweeps/fork.py", "sweeps/nursery.py", "sweeps/single.py"}
+OWN_MODULES |= {"sweeps/fork.py", "sweeps/single.py"}
 """They import modules of this package: by names in the code, or that lie in one of its folders."""
 
 

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tieline.columns import Columns, TableFile
 from tieline.errors import CosimError, NumericalError
 from tieline.tables import (
     Column,
@@ -295,3 +296,48 @@ def test_a_table_is_written_without_pandas(tmp_path: Path) -> None:
     table = pq.read_table(path)
     assert table["a"].to_pylist() == ["x", None, "\u00e9"]
     assert table["b"].to_pylist() == [True, False, True]
+
+
+def _values_in(path: Path) -> Columns:
+    with TableFile(path) as table:
+        return table.read()
+
+
+def test_values_are_those_of_the_data_frame_in_every_type_and_part(tmp_path: Path) -> None:
+    """A run's summary, read so, would otherwise differ from what a user computes from its table."""
+    columns = [
+        Column("x", "pu", "with gaps"),
+        Column("n", "", "number", "int64"),
+        Column("small", "", "number", "uint8"),
+        Column("flag", "", "truth", "bool"),
+        Column("who", "", "name", "str"),
+    ]
+    stream = TableStream(tmp_path / "some.parquet", columns)
+    for start in (0, 7):
+        x = np.arange(start, start + 7, dtype=np.float64)
+        x[2] = np.nan
+        rows = {"x": x, "n": x.size - np.arange(7), "small": np.arange(7, dtype=np.uint8)}
+        who = np.array([None, *map(str, range(6))], object)
+        stream.append(rows | {"flag": np.arange(7) % 3 == 0, "who": who})
+        stream.flush()
+    (tmp_path / "open.arrows").write_bytes((tmp_path / "some.arrows").read_bytes())
+    stream.close()
+    for path in (tmp_path / "some.parquet", tmp_path / "open.arrows"):
+        frame, values = read_table(path), _values_in(path)
+        assert list(values) == list(frame)
+        for name in ("x", "n", "small", "flag"):
+            assert values[name].dtype == frame[name].dtype
+            np.testing.assert_array_equal(values[name], frame[name].to_numpy())
+        assert values["who"].tolist() == [None, *"012345"] * 2
+
+
+def test_values_of_a_table_without_rows_have_their_types(tmp_path: Path) -> None:
+    """A run that ended at once would otherwise end in an error about its empty tables."""
+    columns = [Column("x", "pu", "number"), Column("who", "", "name", "str")]
+    stream = TableStream(tmp_path / "none.parquet", columns)
+    stream.close()
+    values = _values_in(tmp_path / "none.parquet")
+    assert {name: (len(v), v.dtype) for name, v in values.items()} == {
+        "x": (0, np.dtype(float)),
+        "who": (0, np.dtype(object)),
+    }

@@ -21,7 +21,7 @@ from tieline.cli import app
 from tieline.cli import run as run_command
 from tieline.cosim.interfaces import Clock
 from tieline.cosim.local import run_local
-from tieline.experiment import report
+from tieline.experiment import drawn
 from tieline.experiment.launch import Outcome
 from tieline.experiment.sweep_run import InTurn
 from tieline.experiment.watch import Progress
@@ -80,9 +80,10 @@ def launch(folder: Path, on_progress: Callable[[Progress], None]) -> Outcome:
 @pytest.fixture
 def _short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(run_command, "launcher", lambda: launch)
+    monkeypatch.setattr(run_command, "steps", lambda core: ((), ()))
     monkeypatch.setattr(run_command, "sweep_runner", lambda *_: InTurn(launch))
-    monkeypatch.setattr(report, "draw", lambda *_: [])
-    monkeypatch.setattr(report, "draw_network", lambda *_: [])
+    monkeypatch.setattr(drawn, "draw", lambda *_: [])
+    monkeypatch.setattr(drawn, "draw_network", lambda *_: [])
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
 
@@ -92,8 +93,8 @@ def _short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 def test_every_command_of_a_page_works(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A reader who types what the page says must not be the first to do so."""
     if page.stem != "report":
-        monkeypatch.setattr(report, "write_page", lambda folder, _: folder / "report.html")
-        monkeypatch.setattr(report, "write_point_pages", lambda _: None)
+        monkeypatch.setattr(drawn, "write_page", lambda folder, _: folder / "report.html")
+        monkeypatch.setattr(drawn, "write_point_pages", lambda _: None)
     for kind, text in commands(page.read_text(encoding="utf-8")):
         if kind == "file":
             name = text.split()[1]

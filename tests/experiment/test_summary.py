@@ -1,6 +1,8 @@
 """The numbers of the closing table, against a result made from formulas."""
 
 import csv
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -189,3 +191,17 @@ def test_a_run_that_ends_before_any_event_has_a_summary(tmp_path: Path) -> None:
     assert summary["ending"].startswith("synchronism lost")
     # The dip is not quite over when the settling has come close: 6 mHz above the formula's nadir.
     assert summary["frequency"]["nadir_hz"] == pytest.approx(60 * NADIR_PU, abs=0.01)
+
+
+def test_a_summary_needs_no_pandas(tmp_path: Path) -> None:
+    """Every run, and every point of a sweep, would end half a second later for its import."""
+    run = run_of(tmp_path)
+    script = (
+        "import sys; from pathlib import Path; from tieline.experiment.results import read_runs;"
+        "from tieline.experiment.summary import summarise;"
+        "summarise(read_runs(Path(sys.argv[1]))[0]); print('pandas' in sys.modules)"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", script, run.folder], check=True, capture_output=True, text=True
+    )
+    assert told.stdout == "False\n"

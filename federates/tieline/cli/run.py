@@ -2,6 +2,7 @@
 
 import json
 import os
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,6 +20,7 @@ from tieline.cli.options import (
 )
 from tieline.console import console_of, reporting, say
 from tieline.errors import InputError
+from tieline.garbage import collecting_later
 from tieline.threads import one_thread
 
 if TYPE_CHECKING:
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from tieline.experiment.plan import Plan
     from tieline.experiment.run import Launch
     from tieline.experiment.sweep_run import Runner
+    from tieline.sweeps.single import Steps
 
 MOST_LABELS = 12
 
@@ -61,7 +64,8 @@ def run(
     """
     # Before any import of NumPy, and for the federates that are forked from this process.
     os.environ.update(one_thread(os.environ))
-    from tieline.experiment.load import load_experiment
+    with collecting_later():
+        from tieline.experiment.load import load_experiment
 
     with reporting(debug):
         if reference is None:
@@ -69,7 +73,8 @@ def run(
             say(catalogue())
             raise typer.Exit(InputError.exit_code)
         options = [*(settings or ()), *([f"federation.core={core}"] if core else ())]
-        study = load_experiment(reference, options)
+        with collecting_later():
+            study = load_experiment(reference, options)
         if study.is_sweep:
             from tieline.sweeps.start import with_core
 
@@ -117,6 +122,13 @@ def launcher() -> "Launch":
     from tieline.sweeps.single import launch_here
 
     return launch_here
+
+
+def steps(core: str) -> "tuple[Steps, Steps]":
+    """Return what makes this process ready to be forked for a check, and for federates."""
+    from tieline.sweeps.single import own_steps, shared_steps
+
+    return shared_steps(), own_steps(core)
 
 
 def sweep_runner(plan: "Plan", jobs: int | None, scheduler: str | None) -> "Runner":
@@ -195,26 +207,41 @@ def run_sweep_plan(
 
 
 def _run_single(study: "Study", out: Path | None, quiet: bool, as_json: bool) -> None:
-    from tieline.experiment.progress import shown_progress
-    from tieline.experiment.run import RunFailedError, check_target, default_target, execute
+    from tieline.experiment.artist import Artist
+    from tieline.experiment.report import report as write_report
+    from tieline.experiment.run import check_target
 
     if out is not None:
         check_target(out)
-    plan = prepared(study)
     console = console_of(quiet=quiet or as_json)
+    with Artist() as artist:
+        folder = _executed(study, out, console, as_json)
+        write_report(folder, console, artist.draw)
+    _answer(folder, quiet, as_json)
+
+
+def _executed(study: "Study", out: Path | None, console: "Console", as_json: bool) -> Path:
+    """Check and run an experiment without a sweep, show its course and return its folder."""
+    from tieline.experiment.progress import shown_progress
+    from tieline.experiment.run import RunFailedError, default_target, execute_task
+    from tieline.sweeps.single import planned as task_of
+
+    point = study.points[0]
+    with collecting_later():
+        task = task_of(study, *steps(point.experiment.federation.core))
     console.print(study.question, markup=False, highlight=False, soft_wrap=True)
     try:
         with shown_progress(study.points, console) as listener:
-            folder = execute(plan, out or default_target(study.name), launcher(), listener.on_time)
+            on_time = listener.on_time and partial(listener.on_time, point)
+            return execute_task(task, out or default_target(study.name), launcher(), on_time)
     except RunFailedError as error:
         if as_json:
             _print_json(error.folder)
         raise
-    _show(folder, console, quiet, as_json)
 
 
 def _show(folder: Path, console: "Console", quiet: bool, as_json: bool) -> None:
-    """Write table and plots of a result, and show it as was asked for."""
+    """Write table and plots of a sweep, and show it as was asked for."""
     from tieline.experiment.report import report as write_report
     from tieline.experiment.results import read_runs
 
@@ -222,6 +249,10 @@ def _show(folder: Path, console: "Console", quiet: bool, as_json: bool) -> None:
         _show_spread(folder, console)
     else:
         write_report(folder, console)
+    _answer(folder, quiet, as_json)
+
+
+def _answer(folder: Path, quiet: bool, as_json: bool) -> None:
     if as_json:
         _print_json(folder)
     elif quiet:

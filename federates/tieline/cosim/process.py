@@ -23,10 +23,16 @@ def die_with_launcher() -> None:
     prctl the launcher's own clean-up is all there is.
     """
     launcher = os.environ.get(LAUNCHER_VARIABLE)
-    if launcher is None or not sys.platform.startswith("linux"):
+    if launcher is not None:
+        die_with(int(launcher))
+
+
+def die_with(parent: int) -> None:
+    """Ask the kernel to kill this process when its parent dies; only Linux's does."""
+    if not sys.platform.startswith("linux"):
         return
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != int(launcher):
+    if os.getppid() != parent:
         # It died before the kernel was asked.
         os._exit(1)
 

@@ -3,14 +3,11 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
 from tieline.network.spec import LinkCut, LinkRepair, NetworkSpec
-from tieline.network.topologies.centres import PREFIX
-from tieline.network.topologies.layout import layout
-from tieline.network.topologies.places import NS_PER_KM
+from tieline.network.topologies.constants import NS_PER_KM, PREFIX
 from tieline.network.topologies.power_grid import PowerGrid
 from tieline.network.topologies.stations import Corridor, Station, lines_of, stations_of
 from tieline.units import NS_PER_S
@@ -157,6 +154,11 @@ def _neighbours(name: str, facts: Mapping[str, Any]) -> set[str]:
 
 
 def _laid_out(facts: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    # Half a second of imports, only for those who have no places.
+    import networkx as nx
+
+    from tieline.network.topologies.layout import layout
+
     names = list(dict.fromkeys(p["name"] for key in ("stations", "nodes") for p in facts[key]))
     lengths = [(line["a"], line["b"], line["km"]) for line in facts["lines"]]
     # A link without propagation has a length all the same.

@@ -1,28 +1,26 @@
 """Makes a result presentable: closing table, CSV, plots and page; reads the folder only."""
 
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from tieline.aside import Aside
 from tieline.errors import InputError
+from tieline.experiment.artist import Drawing, draw_here
 from tieline.experiment.overrides import shortest
-from tieline.experiment.plots import draw, drawn_unit
 from tieline.experiment.results import SUMMARY, Run, read_manifest, read_runs
 from tieline.experiment.table import FIELDS, Summary, shown, write_csv
-from tieline.report import write_page, write_point_pages
-from tieline.report.network_figures import draw as draw_network
-from tieline.report.network_figures import has_series, network_plots
 
 
-def report(folder: Path, console: Console) -> None:
+def report(folder: Path, console: Console, draw: Callable[[Path], Drawing] = draw_here) -> None:
     """Write `table.csv`, `plots/` and `report.html`, and print the table and their paths.
 
-    A single run with series of its network has figures of them too.
+    Args:
+        folder: a result with a complete run.
+        console: where it is printed.
+        draw: writes page and figures.
 
     Raises:
         InputError: the folder is no result, or none of its runs is complete.
@@ -33,12 +31,7 @@ def report(folder: Path, console: Console) -> None:
         raise InputError(f"{folder} holds no complete run ({manifest['reason']})")
     summaries = [run.summary() for run in runs]
     write_csv(folder / "table.csv", summaries)
-    meanwhile = Aside(partial(_network_or_points, folder))
-    plots = draw(folder / "plots", runs)
-    meanwhile.join()
-    # It has links to all that is there by now.
-    page = write_page(folder, drawn_unit(runs[0]))
-    plots += network_plots(folder)
+    page, plots = draw(folder)
     console.print(closing_table(summaries))
     for summary in summaries:
         if summary["ending"]:
@@ -65,14 +58,6 @@ def closing_table(summaries: Sequence[Summary]) -> Table:
         cells = [shown(summary, field) for field in FIELDS]
         table.add_row(*([summary["label"]] if is_sweep else []), *cells)
     return table
-
-
-def _network_or_points(folder: Path) -> None:
-    """Draw a single run's network, if it has series; write the pages of a sweep's points."""
-    if read_manifest(folder)["kind"] != "run":
-        write_point_pages(folder)
-    elif has_series(folder):
-        draw_network(folder)
 
 
 def _summary_file(folder: Path, runs: Sequence[Run]) -> Path:

@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
 from tieline.errors import InputError, TielineError
@@ -22,12 +23,12 @@ from tieline.experiment.folder import (
 from tieline.experiment.interrupts import interruptible
 from tieline.experiment.keeper import kept
 from tieline.experiment.plan import Plan
-from tieline.experiment.point import Launch, run_in, task_of
+from tieline.experiment.point import Launch, OnTime, Task, run_in, task_of
 from tieline.experiment.rescue import take_up
 from tieline.experiment.sweep import Point
 from tieline.experiment.sweep_run import InTurn, Listener, RunFailedError, run_sweep
 
-__all__ = ["Launch", "RunFailedError", "check_target", "default_target", "execute"]
+__all__ = ["Launch", "RunFailedError", "check_target", "default_target", "execute", "execute_task"]
 
 
 def default_target(name: str) -> Path:
@@ -90,16 +91,29 @@ def execute(
         InputError: the target is not free, another run is under way to it, or it cannot be written.
         RunFailedError: a run failed.
     """
+    if plan.study.is_sweep:
+        check_target(target)
+        take_up(target.parent)
+        return run_sweep(plan, target, InTurn(launch), Listener(on_progress))
+    on_time = None if on_progress is None else partial(on_progress, plan.runs[0].point)
+    return execute_task(task_of(plan.runs[0], target), target, launch, on_time)
+
+
+def execute_task(task: Task, target: Path, launch: Launch, on_time: OnTime | None = None) -> Path:
+    """Run the task of a single run as `execute` does, and return its folder.
+
+    Args:
+        task: whose result belongs into `target`, whatever folder it names.
+        target: the result folder to make.
+        launch: starts the federates.
+        on_time: is told the simulated time that the run has reached, s.
+
+    Raises:
+        InputError: the target is not free, another run is under way to it, or it cannot be written.
+        RunFailedError: the run failed.
+    """
     check_target(target)
     take_up(target.parent)
-    if plan.study.is_sweep:
-        return run_sweep(plan, target, InTurn(launch), Listener(on_progress))
-    task = task_of(plan.runs[0], target)
-
-    def on_time(time_s: float) -> None:
-        if on_progress is not None:
-            on_progress(plan.runs[0].point, time_s)
-
     with (
         interruptible() as interrupts,
         _own_folder(target) as work,

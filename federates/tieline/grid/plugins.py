@@ -10,7 +10,8 @@ import importlib.util
 import re
 import sys
 import traceback
-from importlib.metadata import entry_points
+from functools import cache
+from importlib.metadata import EntryPoints, entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -32,7 +33,7 @@ def shipped_keys(role: str) -> list[str]:
 
 def installed_keys(role: str) -> list[str]:
     """Return the keys of the models of a role that installed packages offer."""
-    return sorted(point.name for point in entry_points(group=f"tieline.{role}"))
+    return sorted(point.name for point in _offered(role))
 
 
 def installed_models(role: str) -> dict[str, "type[Model]"]:
@@ -42,7 +43,7 @@ def installed_models(role: str) -> dict[str, "type[Model]"]:
         InputError: one cannot be loaded, is no model, or has not the key of its entry point.
     """
     found = {}
-    for point in entry_points(group=f"tieline.{role}"):
+    for point in _offered(role):
         where = f"entry point {point.name} = {point.value} of group tieline.{role}"
         try:
             loaded = point.load()
@@ -82,6 +83,17 @@ def file_models(path: Path, role: str) -> dict[str, "type[Model]"]:
     if not found:
         raise InputError(f"{where} defines no subclass of tieline.grid.models.base.Model")
     return found
+
+
+def _offered(role: str) -> EntryPoints:
+    return _entry_points(tuple(sys.path))[role]
+
+
+@cache
+def _entry_points(path: tuple[str, ...]) -> dict[str, EntryPoints]:
+    """Return by role what the packages on the path offer: a file of each of them is read for it."""
+    found = entry_points()
+    return {role: found.select(group=f"tieline.{role}") for role in FOLDERS}
 
 
 def _run(path: Path, where: str) -> ModuleType:

@@ -3,13 +3,12 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-import networkx as nx
-
 from tieline.errors import InputError
 from tieline.network.entry import Entry
 from tieline.network.findings import Findings
 from tieline.network.jitter import Jitter, JitterEntry
 from tieline.network.losses import Bernoulli
+from tieline.network.parts import parts_of
 from tieline.network.routing import Pair, fault_of
 from tieline.network.schema import (
     ControllerEntry,
@@ -276,15 +275,13 @@ class Entries:
         It looks at the ends alone, so that a link with another fault still counts as one, and says
         nothing where an end is unknown: that link may be the one that is missing.
         """
-        graph: nx.Graph[str] = nx.Graph()
-        graph.add_nodes_from(self._names)
+        joined: list[tuple[str, str]] = []
         for raw in self._list("links"):
             ends = (raw.get("a"), raw.get("b")) if isinstance(raw, dict) else (None, None)
             if not all(isinstance(end, str) and end in self._names for end in ends):
                 return
-            graph.add_edge(str(ends[0]), str(ends[1]))
-        parts = sorted(nx.connected_components(graph), key=lambda part: (-len(part), min(part)))
-        for part in parts[1:]:
+            joined.append((str(ends[0]), str(ends[1])))
+        for part in parts_of(self._names, joined)[1:]:
             self._findings.add(("nodes", min(part)), self._cut_off(part))
 
     def _cut_off(self, part: set[str]) -> str:

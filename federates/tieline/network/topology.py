@@ -8,7 +8,6 @@ from tieline.errors import InputError
 from tieline.network.entries import Entries, Sites, jitter_of
 from tieline.network.events import changes_of, rerouted
 from tieline.network.linkless import least_delay_without_links_ns
-from tieline.network.ns3.limits import check_carried
 from tieline.network.routing import Router, Routing
 from tieline.network.settings import NetworkSettings
 from tieline.network.spec import (
@@ -67,6 +66,9 @@ def network_spec(
     if topology is not None:
         spec = read_topology(topology, sources, destinations, settings)
         if settings.engine == "ns3":
+            # It brings the packet engine and its compiler with it.
+            from tieline.network.ns3.limits import check_carried
+
             check_carried(spec)
         return spec
     least_ns = least_delay_without_links_ns(settings, sources, destinations)

@@ -44,13 +44,6 @@ def draw(folder: Path, plots: Path | None = None) -> list[Path]:
         return save(folder / "plots" if plots is None else plots, figures)
 
 
-def network_plots(folder: Path) -> list[Path]:
-    """Return the files that `draw` has made in a run's folder `plots`."""
-    names = ("controller_delay", "controller_age", "busiest_links")
-    paths = [folder / "plots" / f"{name}.png" for name in names]
-    return [path for path in paths if path.is_file()]
-
-
 def has_series(folder: Path) -> bool:
     """Return whether a run's folder holds the series that `draw` needs, with any packet in them."""
     paths = [folder / f"{name}.parquet" for name in ("controller_series", "link_series")]

@@ -9,7 +9,6 @@ code; a point's process forks its federates in turn and watches them, so that wh
 to itself stays with it.
 """
 
-import importlib
 import json
 import os
 import select
@@ -29,8 +28,9 @@ from tieline.errors import TielineError
 from tieline.experiment.launch import launch
 from tieline.experiment.point import Task, run_task
 from tieline.experiment.watch import Progress
+from tieline.garbage import collecting_later
 from tieline.sweeps.fork import fork, forked
-from tieline.sweeps.single import FEDERATES, WITH_HELICS
+from tieline.sweeps.single import own_steps, shared_steps
 
 _REHEARSED_INTERVALS = 2
 _REHEARSED_ENGINES = ("ideal", "constant", "packet", "empirical")
@@ -192,9 +192,9 @@ class _Reporter:
 
 def _prepare(order: Mapping[str, Any]) -> str:
     """Import and rehearse; return what came of the rehearsal."""
-    modules = FEDERATES if order["core"] == "local" else (*FEDERATES, *WITH_HELICS)
-    for module in modules:
-        importlib.import_module(module)
+    with collecting_later():
+        for step in (*shared_steps(), *own_steps(order["core"])):
+            step()
     run = order["rehearsal"]
     if run is None or run["network"]["engine"] not in _REHEARSED_ENGINES:
         return "not rehearsed"

@@ -37,6 +37,12 @@ def use_file(role: str, path: Path | str | None) -> None:
     _FROM_FILE[role] = {} if path is None else file_models(Path(path), role)
 
 
+def load_shipped() -> None:
+    """Import every model of the package, so that forks of this process need not."""
+    for role in ROLES:
+        _shipped(role)
+
+
 @cache
 def _shipped(role: str) -> dict[str, type[Model]]:
     package = importlib.import_module(f"tieline.grid.models.{FOLDERS[role]}")

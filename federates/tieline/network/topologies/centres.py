@@ -6,13 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tieline.network.spec import Node
+from tieline.network.topologies.constants import PREFIX
 from tieline.network.topologies.draft import DraftCross, DraftLink, LinkDefaults, link_along
 from tieline.network.topologies.flat import ring
 from tieline.network.topologies.hierarchical import Region
 from tieline.network.topologies.places import Floats, Places, Way
-
-PREFIX = "CC_"
-"""What the name of a control centre begins with, in every topology file."""
 
 APART = 0.04
 """Share of the picture's size by which a centre stands off its gateway in x and y (chosen)."""

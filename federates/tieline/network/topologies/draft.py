@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import networkx as nx
 
 from tieline.network.spec import Node
-from tieline.network.topologies.places import NS_PER_KM, Places, Way
+from tieline.network.topologies.constants import NS_PER_KM
+from tieline.network.topologies.places import Places, Way
 
 US = 1_000
 

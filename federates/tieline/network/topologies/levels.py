@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 from tieline.errors import InputError
 from tieline.network.spec import Node
-from tieline.network.topologies.centres import CITY_KM, PREFIX, control_centres, traffic_of
+from tieline.network.topologies.centres import CITY_KM, control_centres, traffic_of
+from tieline.network.topologies.constants import PREFIX
 from tieline.network.topologies.draft import Draft, DraftCross, DraftLink
 from tieline.network.topologies.hierarchical import Region, halved, hierarchical, regions_of
 from tieline.network.topologies.options import CORES, Options

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from tieline.errors import InputError
 from tieline.figures import STYLE, colours
 from tieline.network.spec import NetworkSpec
-from tieline.network.topologies.centres import PREFIX
+from tieline.network.topologies.constants import NS_PER_KM, PREFIX
 from tieline.network.topologies.layout import layout
-from tieline.network.topologies.places import NS_PER_KM
 from tieline.network.topologies.stations import Corridor
 from tieline.network.topologies.write import as_rate
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import cKDTree
 
 from tieline.network.topologies.stations import Corridor
 from tieline.streams import stream
@@ -18,9 +17,6 @@ from tieline.streams import stream
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Pair = tuple[str, str]
-
-NS_PER_KM = 5_000
-"""Optical fibre: ITU-T G.114, annex A."""
 
 ROUTE_FACTOR = 1.5
 """Length of a cable over the great-circle distance: ITU-T G.826 for less than 1,000 km."""
@@ -108,6 +104,9 @@ class Land:
 
     def neighbours(self, count: int) -> tuple[Integers, Floats]:
         """Return the nearest places, see `Places`."""
+        # A fifth of a second, only for those who lay out a network.
+        from scipy.spatial import cKDTree
+
         km, near = cKDTree(self.xy_km).query(self.xy_km, count + 1)
         own = near == np.arange(len(self.names))[:, None]
         # Of places that coincide, the nearest may not hold the place itself.

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
-import networkx as nx
-
+from tieline.network.parts import parts_of
 from tieline.network.topologies.draft import DraftLink
 
 Pair = tuple[str, str]
@@ -24,11 +23,9 @@ def severing_corridors(
             along.setdefault((min(a, b), max(a, b)), []).append(link)
     found = {}
     for corridor, cut in sorted(along.items()):
-        graph: nx.Graph[str] = nx.Graph()
-        graph.add_nodes_from(names)
-        graph.add_edges_from((link.a, link.b) for link in links)
-        graph.remove_edges_from((link.a, link.b) for link in cut)
-        parts = sorted(nx.connected_components(graph), key=lambda part: (-len(part), min(part)))
+        lost = {frozenset((link.a, link.b)) for link in cut}
+        pairs = [(x.a, x.b) for x in links if frozenset((x.a, x.b)) not in lost]
+        parts = parts_of(names, pairs)
         if len(parts) > 1:
             found[corridor] = tuple(sorted(name for part in parts[1:] for name in part))
     return found

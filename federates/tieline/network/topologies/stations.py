@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
 
-import networkx as nx
-
 from tieline.errors import InputError
+from tieline.network.parts import parts_of
 from tieline.network.topologies.power_grid import Branch, Bus, PowerGrid
 
 SITE_REACTANCE_PU = 0.0011
@@ -50,14 +49,12 @@ def stations_of(grid: PowerGrid) -> tuple[Station, ...]:
     A station is named after the bus of its PMU, or else after its bus of highest voltage; of
     several the lowest number counts. Numbers are padded so that names sort as numbers do.
     """
-    graph: nx.Graph[int] = nx.Graph()
-    graph.add_nodes_from(bus.number for bus in grid.buses)
     inside = (branch for branch in grid.branches if is_inside_a_station(branch))
-    graph.add_edges_from((branch.start, branch.end) for branch in inside)
+    joined = ((branch.start, branch.end) for branch in inside)
     buses = {bus.number: bus for bus in grid.buses}
     width = max(3, len(str(max(buses))))
     stations = []
-    for part in nx.connected_components(graph):
+    for part in parts_of(buses, joined):
         members = sorted(part)
         first = _naming_bus([buses[number] for number in members], grid.pmus)
         stations.append(Station(f"S{first.number:0{width}d}", tuple(members), first.area))
@@ -109,10 +106,8 @@ def _length_km(branch: Branch, kv: float, base_mva: float) -> float:
 def _refuse_islands(
     grid: PowerGrid, stations: Sequence[Station], corridors: Sequence[Corridor]
 ) -> None:
-    graph: nx.Graph[str] = nx.Graph()
-    graph.add_nodes_from(station.name for station in stations)
-    graph.add_edges_from((corridor.a, corridor.b) for corridor in corridors)
-    parts = sorted(nx.connected_components(graph), key=lambda part: (-len(part), min(part)))
+    names = [station.name for station in stations]
+    parts = parts_of(names, [(corridor.a, corridor.b) for corridor in corridors])
     if len(parts) > 1:
         lost = [f"{', '.join(sorted(part)[:8])}{' ...' * (len(part) > 8)}" for part in parts[1:]]
         raise InputError(
