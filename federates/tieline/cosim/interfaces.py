@@ -266,7 +266,9 @@ def _head(data: bytes, layout: struct.Struct, magic: bytes, at: int = 0) -> tupl
     """Return the numbers that a bundle begins with, at a place of a message."""
     begin = data[at : at + 8]
     if len(data) - at < layout.size or not begin.startswith(magic):
-        raise CosimError(f"expected a {magic.decode()} bundle, got {len(data) - at} bytes {begin!r}")
+        raise CosimError(
+            f"expected a {magic.decode()} bundle, got {len(data) - at} bytes {begin!r}"
+        )
     _, *numbers = layout.unpack_from(data, at)
     return tuple(numbers)
 

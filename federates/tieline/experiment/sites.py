@@ -88,9 +88,7 @@ class Surveyor:
         if sites.sensors and sites.controllers:
             sources, destinations = sites.sources(), sites.destinations()
             try:
-                spec = self._networks.spec(
-                    experiment.network, topology, sources, destinations
-                )
+                spec = self._networks.spec(experiment.network, topology, sources, destinations)
                 lookahead_ns = spec.lookahead_ns
             except InputError as error:
                 findings += error.findings
