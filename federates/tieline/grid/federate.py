@@ -259,7 +259,7 @@ class GridFederate:
         return f"{quantity}.B{self._sensors[sensor]}"
 
     def _note_age(self, tick: int) -> None:
-        """Say how old the controllers' data are at the row of a tick, the next one to be written."""
+        """Say how old the controllers' data are at the row of a tick, the next to be written."""
         if self._grid.ending is not None:
             return
         now_ns = tick_ns(tick, self._grid.steps_per_second)
