@@ -10,7 +10,7 @@ from tieline.network.losses import Bernoulli
 from tieline.network.queues import DropTail
 from tieline.network.settings import NetworkSettings
 from tieline.network.spec import Link, NetworkSpec
-from tieline.network.topology import network_spec, read_topology
+from tieline.network.topology import Networks, network_spec, read_topology
 
 SOURCES = [{"name": "pmu00", "bus": 2}, {"name": "pmu01", "bus": 4}]
 DESTINATIONS = [
@@ -259,6 +259,19 @@ def test_checking_alone_returns_nothing_and_refuses_the_same(tmp_path):
     path.write_text(GOOD.replace("queue: 7", "queue: 0"), encoding="utf-8")
     with pytest.raises(InputError, match=r"network\.yaml:14"):
         network_spec(NetworkSettings(), path, SOURCES, DESTINATIONS)
+
+
+def test_networks_of_one_file_are_those_that_are_read_one_by_one(tmp_path):
+    """Otherwise the points of a sweep would run on other networks than the same runs alone."""
+    path = tmp_path / "network.yaml"
+    path.write_text(GOOD, encoding="utf-8")
+    networks = Networks()
+    for changes in ({}, {"mean_delay": 0.2}, {"loss": 0.1, "mean_delay": 0.2}, {"mean_delay": 0.3}):
+        settings = NetworkSettings(**changes)
+        alone = network_spec(settings, path, SOURCES, DESTINATIONS)
+        assert networks.spec(settings, path, SOURCES, DESTINATIONS) == alone
+    with pytest.raises(InputError, match=r"mean_delay must be at least 0\.069138 s"):
+        networks.spec(NetworkSettings(mean_delay=0.05), path, SOURCES, DESTINATIONS)
 
 
 def test_a_normal_jitter_is_read(tmp_path):
