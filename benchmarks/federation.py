@@ -51,7 +51,7 @@ class Heard:
 
     def __init__(self, participant: Participant) -> None:
         self.name = participant.name
-        self.messages: list[bytes] = []
+        self.messages: list[tuple[int, bytes]] = []
         self.start, self.finish, self.abort = (
             participant.start,
             participant.finish,
@@ -61,7 +61,7 @@ class Heard:
 
     def advance(self, k: int, received: bytes) -> bytes:
         """Return the participant's answer."""
-        self.messages.append(received)
+        self.messages.append((k, received))
         return self._advance(k, received)
 
 
@@ -84,7 +84,7 @@ def run_alone(name: str, path: Path) -> dict[str, float]:
         participant = opener(name)(run, Path(folder))
         began, began_cpu = time.perf_counter(), time.process_time()
         participant.start()
-        for k, message in enumerate(messages[name]):
+        for k, message in messages[name]:
             participant.advance(k, message)
         participant.finish()
         wall_s, cpu_s = time.perf_counter() - began, time.process_time() - began_cpu

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tieline.cosim.interfaces import DELIVERY, DeliveryBundle
+from tieline.cosim.interfaces import DELIVERY, Clock, DeliveryBundle
 from tieline.experiment.load import load_experiment
 from tieline.experiment.plan import prepare
 from tieline.grid.federate import open_participant
@@ -33,14 +33,16 @@ def peak_mb() -> float:
 def main() -> None:
     """Run the grid alone and print what each stage added."""
     run = dict(prepare(load_experiment("g26_trip", list(SETTINGS))).runs[0].run)
-    nothing = DeliveryBundle(0, np.empty(0, DELIVERY), np.empty((0, 0), np.uint8)).to_bytes()
+    clock = Clock(**run["clock"])
+    nothing = np.empty(0, DELIVERY), np.empty((0, 0), np.uint8)
     peaks = {"libraries": peak_mb()}
     with tempfile.TemporaryDirectory() as folder:
         grid = open_participant(run, Path(folder))
         grid.start()
         peaks["compiled grid"] = peak_mb()
-        for k in range(run["clock"]["intervals"]):
-            grid.advance(k, nothing)
+        for k in clock.meetings():
+            until_ns = clock.at_ns(clock.next_meeting(k))
+            grid.advance(k, DeliveryBundle(until_ns, *nothing).to_bytes())
         peaks["40 s recorded"] = peak_mb()
         grid.finish()
         peaks["table finished"] = peak_mb()

@@ -47,8 +47,8 @@ class Dummy:
             self._table = TableStream(path, [Column("t_s", "s", "simulated time")])
 
     def start(self) -> list[bytes]:
-        """Return the first messages: one of the grid, of the network as many as it leads by."""
-        return [self._message() for _ in range(1 if self.name == GRID else self._lead)]
+        """Return the first message: the grid's, and the network's where it has a lead."""
+        return [self._message()] if self.name == GRID or self._lead else []
 
     def advance(self, k: int, received: bytes) -> bytes:
         """Return the next message, after the pause or the fault that the options ask for."""

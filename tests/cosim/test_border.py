@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tieline.cosim.border import FRAMES_REMEMBERED, DeliveryBorder, check_stamps
-from tieline.cosim.interfaces import DELIVERY, Clock, DeliveryBundle
+from tieline.cosim.interfaces import DELIVERY, Clock, DeliveryBundle, FrameBundle
 from tieline.errors import CosimError, TimeContractBroken
 from tieline.units import tick_ns
 
@@ -154,3 +154,49 @@ def test_packets_for_guests_cannot_be_stamped_outside_their_interval() -> None:
     for arrivals in ([T1_NS - 1, T2_NS], [T1_NS, T2_NS + 1]):
         with pytest.raises(TimeContractBroken, match=r"outside interval 1 from 0\.016666666"):
             check_stamps("network", CLOCK, 1, np.array(arrivals))
+
+
+STRIDES = Clock(RATE_HZ, 2_000, lead=5)
+T3_NS, T6_NS = tick_ns(3, RATE_HZ), tick_ns(6, RATE_HZ)
+
+
+def strides() -> DeliveryBorder:
+    """Return a border whose federates meet every three intervals, after the first stride."""
+    made = DeliveryBorder(STRIDES, SOURCES, DESTINATIONS)
+    made.check(0, bundle((T2_NS, 1, 0, 0), until_ns=T3_NS))
+    return made
+
+
+def test_with_a_lead_a_bundle_holds_a_whole_stride() -> None:
+    """Otherwise grid and network would have to meet at every interval."""
+    strides().check(3, bundle((T3_NS + 1, 0, 0, 0), (T6_NS, 2, 1, 2), until_ns=T6_NS))
+
+
+@pytest.mark.parametrize(
+    ("row", "what"),
+    [
+        ((T3_NS + 9, 1, 0, 0), "has been delivered before"),
+        ((T6_NS, 0, 0, 4), "is measured .* after the interval's begin"),
+        ((T6_NS + 1, 0, 0, 2), "came for the interval from 50000000 to 100000000 ns"),
+    ],
+)
+def test_with_a_lead_a_delivery_outside_the_contract_is_refused(row: Row, what: str) -> None:
+    """A packet that comes twice, or too early, must not slip by because strides are longer."""
+    with pytest.raises(TimeContractBroken, match=what):
+        strides().check(3, bundle(row, until_ns=T6_NS))
+    with pytest.raises(TimeContractBroken, match="came for interval 3"):
+        strides().check(4, bundle(until_ns=T6_NS))
+
+
+def test_frames_of_several_instants_are_one_message() -> None:
+    """Otherwise the network would take the frames of one instant for those of another."""
+    bundles = [FrameBundle(t, np.full((2, 34), t % 251, np.uint8)) for t in (0, T1_NS, T2_NS)]
+    message = b"".join(each.to_bytes() for each in bundles)
+    found = FrameBundle.several_from_bytes(message)
+    assert [each.measured_ns for each in found] == [0, T1_NS, T2_NS]
+    assert [each.to_bytes() for each in found] == [each.to_bytes() for each in bundles]
+    for cut in (message[:-1], message + b"TLF1", b""):
+        with pytest.raises(CosimError):
+            FrameBundle.several_from_bytes(cut)
+    with pytest.raises(CosimError, match="one instant, got 3"):
+        FrameBundle.from_bytes(message)

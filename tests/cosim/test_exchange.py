@@ -198,10 +198,10 @@ T5_NS = 83_333_333
 def test_with_a_lead_the_federates_meet_once_a_stride_with_one_message() -> None:
     """If not, one federate would have to wait for the other at every turn."""
     arrivals = {
-        1_000: [(0, bundle(0)), (0, bundle(1))],
-        T2_NS + 1_000: [(T2_NS, bundle(2)), (T2_NS, bundle(3))],
+        1_000: [(0, bundle(0))],
+        T2_NS + 1_000: [(T2_NS, bundle(2))],
         T4_NS + 1_000: [(T4_NS, bundle(4))],
-        T5_NS + 1_000: [(T5_NS, end(*[b"x"] * 5, k=5))],
+        T5_NS + 1_000: [(T5_NS, end(*[b"x"] * 3, k=5))],
     }
     link = ScriptedLink(arrivals)
     run_grid(Echo("grid", b"x"), Exchange("grid", link, LEADING), LEADING)
@@ -221,12 +221,12 @@ def test_with_a_lead_the_network_hands_over_the_stride_after_the_one_that_begins
     """If not, the grid would have to wait for what arrives in the stride that it simulates."""
     arrivals = {
         1_000: [(0, bundle(0))],
-        T2_NS + 1_000: [(T2_NS, bundle(1)), (T2_NS, bundle(2))],
-        T4_NS + 1_000: [(T4_NS, bundle(3)), (T4_NS, bundle(4))],
-        T5_NS + 1_000: [(T5_NS, bundle(5)), (T5_NS, end(*[b"x"] * 6, k=5))],
+        T2_NS + 1_000: [(T2_NS, bundle(2))],
+        T4_NS + 1_000: [(T4_NS, bundle(4))],
+        T5_NS + 1_000: [(T5_NS, bundle(5)), (T5_NS, end(*[b"x"] * 4, k=5))],
     }
     link = ScriptedLink(arrivals)
-    network = Echo("network", *[b"x"] * 3)
+    network = Echo("network", b"x")
     run_network(network, Exchange("network", link, LEADING), LEADING)
     assert link.log == [
         ("send", 0),
@@ -243,7 +243,7 @@ def test_with_a_lead_the_network_hands_over_the_stride_after_the_one_that_begins
 def test_with_a_lead_a_bundle_of_another_stride_breaks_the_contract() -> None:
     """If not, deliveries could reach the grid a stride early or late."""
     link = ScriptedLink({1_000: [(0, bundle(0)), (0, bundle(2))]})
-    with pytest.raises(TimeContractBroken, match=r"bundle 2 came .* the contract says 0 to 1"):
+    with pytest.raises(TimeContractBroken, match=r"bundle 2 came .* the contract says 0 at 0 ns"):
         run_grid(Echo("grid", b"x"), Exchange("grid", link, LEADING), LEADING)
 
 

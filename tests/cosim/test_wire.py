@@ -6,7 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tieline.cosim.wire import Kind, Ledger, join, put_together, read_parts, split
+from tieline.cosim.wire import (
+    TOGETHER_BYTES,
+    Kind,
+    Ledger,
+    join,
+    put_together,
+    read_parts,
+    split,
+)
 from tieline.errors import CosimError
 
 
@@ -21,6 +29,14 @@ def test_a_bundle_comes_back_whatever_the_order_of_its_parts(
     parts = [part for message in messages for part in read_parts(message)]
     assert {(part.kind, part.k) for part in parts} == {(Kind.BUNDLE, 7)}
     assert join(parts) == payload
+
+
+def test_a_long_stride_travels_in_parts_on_a_core_without_a_limit_of_its_own() -> None:
+    """If not, a large system's strides would be longer messages than HELICS was seen to carry."""
+    payload = bytes(range(250)) * 5_000
+    messages = put_together(split(Kind.BUNDLE, 3, payload, None), None)
+    assert [len(message) <= TOGETHER_BYTES for message in messages] == [True] * 3
+    assert join(part for message in messages for part in read_parts(message)) == payload
 
 
 @given(

@@ -26,11 +26,12 @@ def opened(
     grid: dict[str, Any] | None = None,
     wams: dict[str, Any] | None = None,
     delay: float | None = None,
+    lead: int = 0,
 ) -> GridFederate:
-    """Return the grid of a run of the miniWECC with 60 meetings a second."""
+    """Return the grid of a run of the miniWECC with 60 meetings a second, fewer with a lead."""
     destinations = [{"name": unit, "unit": unit, "bus": 0} for unit in case.units]
     run = {
-        "clock": {"rate_hz": RATE_HZ, "intervals": 6},
+        "clock": {"rate_hz": RATE_HZ, "intervals": 6, "lead": lead},
         "case": str(case_folder("miniwecc")),
         "grid": {"duration": 0.1, "pss": PSS, **(grid or {})},
         "wams": wams or {},

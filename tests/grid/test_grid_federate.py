@@ -56,6 +56,32 @@ def test_the_frames_say_what_the_pmus_measured(miniwecc: Case, tmp_path: Path) -
     assert np.ptp(frames["FREQ"]) > 1e-3
 
 
+def test_a_stride_at_once_is_the_same_as_interval_by_interval(
+    miniwecc: Case, tmp_path: Path
+) -> None:
+    """Otherwise a result would depend on how often the federates meet."""
+    event = {"at": 0.025, "trip_generator": "G26"}
+    coming = {k: (tick_ns(k, RATE_HZ) + 7_000_000, k, frames_of(F_HZ, 0)) for k in range(1, 6)}
+    found = []
+    for lead, stride in ((0, 1), (5, 3)):
+        folder = tmp_path / str(lead)
+        folder.mkdir()
+        grid = opened(miniwecc, folder, {"events": [event]}, lead=lead)
+        frames = grid.start()
+        for first in range(0, 6, stride):
+            last = first + stride
+            arrivals = [coming[k] for k in range(first, last) if k in coming]
+            until_ns = tick_ns(last, RATE_HZ)
+            frames.append(grid.advance(first, delivered(first, *arrivals, until_ns=until_ns)))
+        grid.finish()
+        tables = [read_table(path) for path in sorted(folder.glob("*.parquet"))]
+        found.append((b"".join(frames), tables))
+    assert found[0][0] == found[1][0]
+    assert len(FrameBundle.several_from_bytes(found[0][0])) == 7
+    for one, other in zip(found[0][1], found[1][1], strict=True):
+        assert one.equals(other)
+
+
 @pytest.mark.parametrize(
     ("arrival_ns", "tick"),
     [

@@ -13,7 +13,7 @@ from tieline.cosim.interfaces import Clock, FrameBundle
 from tieline.network.federate import open_participant
 from tieline.network.settings import NetworkSettings
 from tieline.network.spec import FRAME_BYTES, NetworkSpec, packet_bytes
-from tieline.network.topology import mean_unloaded_delay_ns, read_topology
+from tieline.network.topology import read_topology
 from tieline.resources import shipped
 from tieline.tables import read_table
 
@@ -116,13 +116,13 @@ def test_the_header_states_the_busiest_link_and_the_mean():
     assert set(busiest) == {"S101", "S105"}
     rate_bps = flows[busiest] * 60 * 8 * packet_bytes(spec.links[0], FRAME_BYTES)
     assert rate_bps == pytest.approx(5.6e6, abs=0.05e6)
-    assert mean_unloaded_delay_ns(spec) == pytest.approx(98.9e6, abs=0.05e6)
+    assert spec.mean_unloaded_delay_ns == pytest.approx(98.9e6, abs=0.05e6)
 
 
 @pytest.mark.parametrize("target", [0.1, 0.25, 0.5, 1.0, 1.25])
 def test_every_mean_delay_of_the_study_can_be_reached(target):
     """Otherwise the experiments that are shipped would be refused."""
-    assert mean_unloaded_delay_ns(network(mean_delay=target)) == pytest.approx(target * 1e9, abs=1)
+    assert network(mean_delay=target).mean_unloaded_delay_ns == pytest.approx(target * 1e9, abs=1)
 
 
 def run_for(folder: Path, intervals: int) -> None:
@@ -159,5 +159,5 @@ def test_combined_delays_of_the_base_case_lie_between_95_and_125_ms(tmp_path):
     assert flows["sent"].sum() == 1020 * 240
     assert links["max_queue"].max() > 20
     assert 0.5 < links["utilisation"].max() < 0.95
-    queueing_s = flows["delay_mean_s"].mean() - mean_unloaded_delay_ns(network()) / 1e9
+    queueing_s = flows["delay_mean_s"].mean() - network().mean_unloaded_delay_ns / 1e9
     assert 0.0005 < queueing_s < 0.003

@@ -11,7 +11,6 @@ from tieline.errors import CosimError, InputError, TimeContractBroken
 from tieline.network.federate import open_participant
 from tieline.resources import case_folder
 from tieline.tables import read_table, units_of
-from tieline.units import tick_ns
 
 MINIWECC = case_folder("miniwecc") / "network.yaml"
 
@@ -210,19 +209,39 @@ def test_a_lead_changes_no_byte(tmp_path: Path, processing: str, lead: int) -> N
     for lead_taken in (0, lead):
         folder = tmp_path / str(lead_taken)
         folder.mkdir()
-        participant = open_participant(miniwecc_run(topology, lead_taken), folder)
-        bundles = participant.start()
-        for k in range(12):
-            payloads = np.full((3, 34), k, np.uint8)
-            frames = FrameBundle(tick_ns(k, 60), payloads)
-            bundles.append(participant.advance(k, frames.to_bytes()))
-        assert bundles[12:] == [b""] * lead_taken
+        run = miniwecc_run(topology, lead_taken)
+        participant = open_participant(run, folder)
+        deliveries = taken_through(participant, Clock(**run["clock"]))
         participant.finish()
         tables = [read_table(path) for path in sorted(folder.glob("*.parquet"))]
-        sent.append((bundles[:12], tables))
+        sent.append((deliveries, tables))
     assert sent[0][0] == sent[1][0]
+    assert len(sent[0][0]) > 30
     for one, other in zip(sent[0][1], sent[1][1], strict=True):
         assert one.equals(other)
+
+
+def taken_through(participant: Any, clock: Clock) -> list[tuple[Any, bytes]]:
+    """Return each delivery of a whole run with its frame's bytes, meeting by meeting."""
+    messages = participant.start()
+    since = 0
+    for k in [*clock.meetings(), clock.intervals]:
+        measured = [
+            FrameBundle(clock.at_ns(number), np.full((3, 34), number, np.uint8)).to_bytes()
+            for number in range(since, k + 1)
+        ]
+        messages.append(participant.advance(k, b"".join(measured)))
+        since = k + 1
+    bundles = [DeliveryBundle.from_bytes(message) for message in messages if message]
+    assert [bundle.until_ns for bundle in bundles] == [
+        clock.at_ns(clock.next_meeting(k)) for k in clock.meetings()
+    ]
+    names = ("arrival_ns", "source", "destination", "sequence")
+    return [
+        (record[list(names)].tolist(), bundle.payloads[record["payload"]].tobytes())
+        for bundle in bundles
+        for record in bundle.records
+    ]
 
 
 @pytest.mark.parametrize("network", [{}, {"engine": "constant", "delay": 0.25, "topology": None}])
@@ -231,9 +250,9 @@ def test_a_lead_beyond_the_lookahead_is_refused_at_the_first_late_frame(tmp_path
     run = run_file(tmp_path, **network)
     run["clock"]["lead"] = 19
     participant = open_participant(run, tmp_path)
-    participant.start()
+    clock = Clock(**run["clock"])
     with pytest.raises(CosimError, match="came when the network had reached"):
-        participant.advance(0, frames(0).to_bytes())
+        taken_through(participant, clock)
 
 
 def miniwecc_run(topology: Path, lead: int) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from tieline.network.losses import Bernoulli
 from tieline.network.queues import DropTail
 from tieline.network.settings import NetworkSettings
 from tieline.network.spec import Link, NetworkSpec
-from tieline.network.topology import mean_unloaded_delay_ns, network_spec, read_topology
+from tieline.network.topology import Networks, network_spec, read_topology
 
 SOURCES = [{"name": "pmu00", "bus": 2}, {"name": "pmu01", "bus": 4}]
 DESTINATIONS = [
@@ -110,7 +110,7 @@ def test_the_unloaded_mean_by_hand(tmp_path):
     10 Mbit/s (56.8 us) and 62 at 512 kbit/s (968.75 us), 2.25 ms of fibre, 1 ms of mean jitter.
     """
     across_ns = 67e6 + 56_800 + 968_750 + 2_250_000 + 1_000_000
-    assert mean_unloaded_delay_ns(read(tmp_path)) == pytest.approx((67e6 + across_ns) / 2, abs=1)
+    assert read(tmp_path).mean_unloaded_delay_ns == pytest.approx((67e6 + across_ns) / 2, abs=1)
 
 
 @pytest.mark.parametrize("target", [0.1, 0.25, 1.25])
@@ -118,7 +118,7 @@ def test_mean_delay_is_reached_by_longer_processing_at_every_pmu(tmp_path, targe
     """Otherwise a study of longer delays would change the shape of their distribution, too."""
     base, spec = read(tmp_path), read(tmp_path, mean_delay=target)
     # The extra time is rounded to a whole nanosecond.
-    assert mean_unloaded_delay_ns(spec) == pytest.approx(target * 1e9, abs=1)
+    assert spec.mean_unloaded_delay_ns == pytest.approx(target * 1e9, abs=1)
     extra = {
         new.processing_ns - old.processing_ns
         for new, old in zip(spec.sources, base.sources, strict=True)
@@ -259,6 +259,19 @@ def test_checking_alone_returns_nothing_and_refuses_the_same(tmp_path):
     path.write_text(GOOD.replace("queue: 7", "queue: 0"), encoding="utf-8")
     with pytest.raises(InputError, match=r"network\.yaml:14"):
         network_spec(NetworkSettings(), path, SOURCES, DESTINATIONS)
+
+
+def test_networks_of_one_file_are_those_that_are_read_one_by_one(tmp_path):
+    """Otherwise the points of a sweep would run on other networks than the same runs alone."""
+    path = tmp_path / "network.yaml"
+    path.write_text(GOOD, encoding="utf-8")
+    networks = Networks()
+    for changes in ({}, {"mean_delay": 0.2}, {"loss": 0.1, "mean_delay": 0.2}, {"mean_delay": 0.3}):
+        settings = NetworkSettings(**changes)
+        alone = network_spec(settings, path, SOURCES, DESTINATIONS)
+        assert networks.spec(settings, path, SOURCES, DESTINATIONS) == alone
+    with pytest.raises(InputError, match=r"mean_delay must be at least 0\.069138 s"):
+        networks.spec(NetworkSettings(mean_delay=0.05), path, SOURCES, DESTINATIONS)
 
 
 def test_a_normal_jitter_is_read(tmp_path):

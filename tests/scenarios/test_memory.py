@@ -36,10 +36,11 @@ in memory would take more. The test asserts that it is below a tenth of what is 
 
 
 class Gauge:
-    """A grid that notes what its process holds at two instants of simulated time."""
+    """A grid that notes what its process holds before the strides that end at two instants."""
 
-    def __init__(self, grid: Participant) -> None:
+    def __init__(self, grid: Participant, clock: Clock) -> None:
         self._grid = grid
+        self._clock = clock
         self.name = grid.name
         self.held: dict[int, int] = {}
 
@@ -47,10 +48,11 @@ class Gauge:
         return self._grid.start()
 
     def advance(self, k: int, received: bytes) -> bytes:
-        if k + 1 in (EARLY_S * RATE_HZ, LATE_S * RATE_HZ):
+        until = self._clock.next_meeting(k)
+        if until in (EARLY_S * RATE_HZ, LATE_S * RATE_HZ):
             gc.collect()
             python, _ = tracemalloc.get_traced_memory()
-            self.held[(k + 1) // RATE_HZ] = python + pa.total_allocated_bytes()
+            self.held[until // RATE_HZ] = python + pa.total_allocated_bytes()
         return self._grid.advance(k, received)
 
     def finish(self) -> None:
@@ -70,8 +72,9 @@ def overloaded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Gauge, Any, Pa
     open_network(run, tmp_path_factory.mktemp("before")).abort("")
     tracemalloc.start()
     try:
-        gauge, network = Gauge(open_grid(run, folder)), open_network(run, folder)
-        run_local(gauge, network, Clock(**run["clock"]))
+        clock = Clock(**run["clock"])
+        gauge, network = Gauge(open_grid(run, folder), clock), open_network(run, folder)
+        run_local(gauge, network, clock)
     finally:
         tracemalloc.stop()
     return gauge, network, folder

@@ -34,30 +34,30 @@ class DeliveryBorder:
         self._is_delivered = np.zeros((FRAMES_REMEMBERED, sources, destinations), np.bool_)
         # Compiles, where that is still to be done, before the federation waits for an answer.
         none = np.empty(0, np.int64)
-        _fault(none, none, none, none, 0, 0, 0, clock.rate_hz, self._is_delivered)
+        _fault(none, none, none, none, 0, 0, 0, 0, clock.rate_hz, self._is_delivered)
 
     def check(self, k: int, bundle: DeliveryBundle) -> None:
-        """Refuse interval k's bundle if anything in it breaks the contract.
+        """Refuse the bundle of the stride that begins at t_k if anything in it breaks the contract.
 
         Raises:
-            TimeContractBroken: an interval is left out or comes again, the bundle is stamped with
-                another instant than t_k+1, or a delivery arrives outside [t_k, t_k+1], out of the
-                order (arrival, source, sequence, destination), twice, or before its frame was
-                measured.
+            TimeContractBroken: a stride is left out or comes again, the bundle is stamped with
+                another instant than its end, or a delivery arrives outside it, out of the order
+                (arrival, source, sequence, destination), twice, or before its frame was measured,
+                or its frame is measured after the stride's begin.
             CosimError: a delivery names a PMU or a controller that there is not.
         """
         if k != self._next:
             raise TimeContractBroken(
                 f"{GRID}: the deliveries of interval {k} came for interval {self._next}"
             )
-        self._next += 1
-        since_ns, until_ns = self._clock.at_ns(k), self._clock.at_ns(k + 1)
+        self._next = self._clock.next_meeting(k)
+        since_ns, until_ns = self._clock.at_ns(k), self._clock.at_ns(self._next)
         if bundle.until_ns != until_ns:
             raise TimeContractBroken(
                 f"{GRID}: the deliveries of interval {k} are stamped {bundle.until_ns} ns,"
                 f" which must be {until_ns} ns"
             )
-        self._is_delivered[k % FRAMES_REMEMBERED] = False
+        self._is_delivered[np.arange(k, self._next) % FRAMES_REMEMBERED] = False
         columns = bundle.columns
         place, fault = _fault(
             columns.arrival_ns,
@@ -65,6 +65,7 @@ class DeliveryBorder:
             columns.destination,
             columns.sequence,
             k,
+            self._next - FRAMES_REMEMBERED,
             since_ns,
             until_ns,
             self._clock.rate_hz,
@@ -76,7 +77,7 @@ class DeliveryBorder:
     def _refuse(self, k: int, records: NDArray[np.void], place: int, fault: int) -> None:
         record: Any = records[place]
         arrival_ns, sequence = int(record["arrival_ns"]), int(record["sequence"])
-        since_ns, until_ns = self._clock.at_ns(k), self._clock.at_ns(k + 1)
+        since_ns, until_ns = self._clock.at_ns(k), self._clock.at_ns(self._next)
         what = (
             f"{GRID}, interval {k}: delivery {place} of {len(records)}, frame {sequence} of PMU "
             f"{record['source']} to controller {record['destination']}, at {arrival_ns} ns"
@@ -117,6 +118,7 @@ def _fault(
     destination: Numbers,
     sequence: Numbers,
     k: int,
+    oldest: int,
     since_ns: int,
     until_ns: int,
     rate_hz: int,
@@ -124,7 +126,8 @@ def _fault(
 ) -> tuple[int, int]:
     """Return the first delivery (of r, each column (r,)) that is at fault and its fault, or -1.
 
-    Sound ones are noted in `is_delivered` (frames, sources, destinations).
+    Sound ones are noted in `is_delivered` (frames, sources, destinations), which remembers the
+    frames from `oldest` on.
     """
     remembered, sources, destinations = is_delivered.shape
     for i in range(len(arrival_ns)):
@@ -149,7 +152,7 @@ def _fault(
                 return i, _DISORDER
             if later == 0:
                 return i, _TWICE
-        if k - number < remembered:
+        if number >= oldest:
             row = number % remembered
             if is_delivered[row, source[i], destination[i]]:
                 return i, _TWICE

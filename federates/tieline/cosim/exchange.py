@@ -1,6 +1,5 @@
 """The time loop: who is granted when, what is sent with which stamp, and what must have come."""
 
-from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
@@ -40,7 +39,8 @@ class Observer(Protocol):
 class Exchange:
     """One federate's side of the contract: numbered bundles, checked stamps, counted streams.
 
-    The federates meet at the first instant t_k of each of the clock's windows. Without a lead the
+    The federates meet at the first instant t_k of each of the clock's strides, and at the end; each
+    has one bundle from the other there, which has the meeting's number. Without a lead the
     network is granted t_k + 1 us and sends its bundle then; the grid, granted t_k + 2 us, has it at
     once and stamps its own bundle t_k+1, to which HELICS holds it. With a lead both are granted
     t_k + 1 us, work side by side, and stamp all that they send with the next meeting's instant.
@@ -84,10 +84,10 @@ class Exchange:
         if self._observer is not None:
             self._observer.grant(k, granted_ns)
 
-    def send(self, k: int, payload: bytes, meeting: int) -> None:
-        """Send bundle `k` so that the peer has it at the meeting at t_`meeting`."""
+    def send(self, k: int, payload: bytes) -> None:
+        """Send bundle `k`, which the peer has at the meeting at t_k."""
         self.sent.add(payload)
-        self._send(Kind.BUNDLE, k, payload, self._stamp_ns(self._name, meeting))
+        self._send(Kind.BUNDLE, k, payload)
 
     def receive(self, k: int) -> bytes:
         """Return the peer's bundle `k`.
@@ -102,8 +102,7 @@ class Exchange:
 
     def send_end(self) -> None:
         """Tell the peer how much was sent, and its hash, at the last meeting."""
-        last = self._clock.intervals
-        self._send(Kind.END, last, self.sent.to_bytes(), self._stamp_ns(self._name, last))
+        self._send(Kind.END, self._clock.intervals, self.sent.to_bytes())
         self._flush()
 
     def check_end(self) -> None:
@@ -122,7 +121,8 @@ class Exchange:
         lag = lag_ns(sender, self._clock) if answers_at_once else 0
         return self._clock.at_ns(meeting) + lag
 
-    def _send(self, kind: Kind, k: int, payload: bytes, at_ns: int) -> None:
+    def _send(self, kind: Kind, k: int, payload: bytes) -> None:
+        at_ns = self._stamp_ns(self._name, k)
         if at_ns != self._unsent_ns:
             self._flush()
         self._unsent_ns = at_ns
@@ -135,14 +135,13 @@ class Exchange:
 
     def _collect(self, meeting: int) -> None:
         expected_ns = self._stamp_ns(PEER[self._name], meeting)
-        due = bundles_due(self._name, meeting, self._clock)
         for stamp_ns, data in self._link.receive():
             for part in read_parts(data):
-                if stamp_ns != expected_ns or part.k not in due:
+                if stamp_ns != expected_ns or part.k != meeting:
                     raise TimeContractBroken(
                         f"{self._name} in interval {meeting}: {PEER[self._name]}'s "
                         f"{part.kind.name.lower()} {part.k} came stamped {stamp_ns} ns, "
-                        f"the contract says {_shown(due)} at {expected_ns} ns"
+                        f"the contract says {meeting} at {expected_ns} ns"
                     )
                 self._arrived.setdefault((part.kind, part.k), []).append(part)
 
@@ -154,73 +153,49 @@ class Exchange:
         return join(parts)
 
 
-def bundles_due(name: str, meeting: int, clock: Clock) -> range:
-    """Return the numbers of the peer's bundles, or of its end, that come to the meeting at t_k."""
-    if name == NETWORK:
-        since = 0 if meeting == 0 else (meeting - 1) // clock.stride * clock.stride + 1
-        return range(since, meeting + 1)
-    if meeting == clock.intervals:
-        return range(meeting, meeting + 1)
-    return range(meeting, min(meeting + clock.stride, clock.intervals))
-
-
-def _shown(numbers: range) -> str:
-    return f"{numbers[0]}" if len(numbers) == 1 else f"{numbers[0]} to {numbers[-1]}"
-
-
 def run_grid(grid: Participant, exchange: Exchange, clock: Clock) -> None:
-    """Take the grid through every interval, up to the checked end marker."""
+    """Take the grid through every stride, up to the checked end marker."""
     [frames] = grid.start()
-    exchange.send(0, frames, 0)
-    for first, last in clock.windows():
-        exchange.meet(first)
-        for k in range(first, last):
-            exchange.send(k + 1, grid.advance(k, exchange.receive(k)), last)
+    exchange.send(0, frames)
+    for k in clock.meetings():
+        exchange.meet(k)
+        exchange.send(clock.next_meeting(k), grid.advance(k, exchange.receive(k)))
     exchange.send_end()
     exchange.meet(clock.intervals)
     exchange.check_end()
 
 
 def run_network(network: Participant, exchange: Exchange, clock: Clock) -> None:
-    """Take the network through every interval, up to the checked end marker.
+    """Take the network through every stride, up to the checked end marker.
 
     Raises:
-        CosimError: the network's first deliveries are not as many as its lead.
+        CosimError: the network's first deliveries are not those of its lead.
     """
-    ready = first_deliveries(network, clock)
-
-    def hand_over(meeting: int) -> None:
-        for k in range(meeting, min(meeting + clock.stride, clock.intervals)):
-            exchange.send(k, ready.popleft(), meeting)
-
-    if clock.lead:
-        hand_over(0)
-    for first, last in clock.windows():
-        exchange.meet(first)
-        for k in bundles_due(NETWORK, first, clock):
-            ready.append(network.advance(k, exchange.receive(k)))
-        hand_over(last if clock.lead else first)
+    for deliveries in first_deliveries(network, clock):
+        exchange.send(0, deliveries)
+    for k in clock.meetings():
+        exchange.meet(k)
+        deliveries = network.advance(k, exchange.receive(k))
+        due = clock.next_meeting(k) if clock.lead else k
+        if due < clock.intervals:
+            exchange.send(due, deliveries)
     if clock.lead:
         exchange.send_end()
     exchange.meet(clock.intervals)
-    *left, last = bundles_due(NETWORK, clock.intervals, clock)
-    for k in left:
-        network.advance(k, exchange.receive(k))
-    # The frames measured at the last instant reach nobody, but they count in the stream.
-    exchange.receive(last)
+    network.advance(clock.intervals, exchange.receive(clock.intervals))
     exchange.check_end()
     if not clock.lead:
         exchange.send_end()
 
 
-def first_deliveries(network: Participant, clock: Clock) -> deque[bytes]:
-    """Return the deliveries that a network can tell before it was given a frame.
+def first_deliveries(network: Participant, clock: Clock) -> list[bytes]:
+    """Return the message that a network with a lead can tell before it was given a frame.
 
     Raises:
         CosimError: they are not those of the clock's lead.
     """
-    first = deque(network.start())
-    if len(first) != clock.lead:
+    first = network.start()
+    if len(first) != (1 if clock.lead else 0):
         raise CosimError(
             f"the network's lead is {clock.lead} intervals, but it began with {len(first)} messages"
         )

@@ -84,7 +84,8 @@ class Clock:
         rate_hz: intervals a second.
         intervals: how many there are.
         lead: by how many intervals the network is ahead: what arrives in [t_k, t_k+1] depends on
-            the frames measured up to t_(k - lead) alone. With a lead the federates work at once.
+            the frames measured up to t_(k - lead) alone. With a lead, an odd number, the federates
+            work at once.
     """
 
     rate_hz: int
@@ -105,10 +106,17 @@ class Clock:
         """Return t_k."""
         return tick_ns(k, self.rate_hz)
 
-    def windows(self) -> list[tuple[int, int]]:
-        """Return (first, one past the last) interval between each meeting and the next."""
-        starts = range(0, self.intervals, self.stride)
-        return [(first, min(first + self.stride, self.intervals)) for first in starts]
+    def next_meeting(self, k: int) -> int:
+        """Return the interval at whose begin the federates meet after the meeting at t_k.
+
+        After the last stride, which may be a shorter one, they meet at the end of the last
+        interval; from there on it is the same.
+        """
+        return min(k + self.stride, self.intervals)
+
+    def meetings(self) -> range:
+        """Return the intervals at whose begin the federates meet; the end is one meeting more."""
+        return range(0, self.intervals, self.stride)
 
 
 def lead_of(rate_hz: int, lookahead_ns: int | None) -> int:
@@ -130,22 +138,24 @@ def lag_ns(name: str, clock: Clock) -> int:
 
 
 class Participant(Protocol):
-    """One federate seen from the federation: bytes in, bytes out, once an interval."""
+    """One federate seen from the federation: bytes in, bytes out, once a meeting."""
 
     name: str
 
     def start(self) -> list[bytes]:
         """Return the messages that the other federate needs before any went the other way.
 
-        They are the grid's frames of t_0, and the network's deliveries of its first `Clock.lead`
-        intervals.
+        They are the grid's frames of t_0, and with a `Clock.lead` the network's deliveries of the
+        first stride.
         """
 
     def advance(self, k: int, received: bytes) -> bytes:
-        """Return one more message for the other federate, given one that came from it.
+        """Return one more message for the other federate, given its one for the meeting at t_k.
 
-        The grid is given the deliveries of [t_k, t_k+1], and returns the frames of t_k+1. The
-        network is given the frames of t_k, and returns the deliveries of interval k + `Clock.lead`.
+        The grid is given the deliveries of the stride that begins at t_k, and returns the frames
+        that are measured until the next meeting, that instant included. The network is given those
+        frames, up to t_k, and returns the deliveries of the stride that begins at t_k or, with a
+        `Clock.lead`, at the next meeting; at the end of the run, where nothing is to come, b"".
         """
 
     def finish(self) -> None:
@@ -178,10 +188,28 @@ class FrameBundle:
         Raises:
             CosimError: the message is no frame bundle.
         """
-        measured_ns, count, size = _head(data, _FRAMES, b"TLF1")
-        _check_length(data, _FRAMES.size + count * size)
-        payloads = np.frombuffer(data, np.uint8, count * size, _FRAMES.size)
-        return cls(measured_ns, payloads.reshape(count, size))
+        bundles = cls.several_from_bytes(data)
+        if len(bundles) != 1:
+            raise CosimError(f"expected the frames of one instant, got {len(bundles)}")
+        return bundles[0]
+
+    @classmethod
+    def several_from_bytes(cls, data: bytes) -> list["FrameBundle"]:
+        """Return the bundles that a message holds, one after another; at least one.
+
+        Raises:
+            CosimError: the message holds something else.
+        """
+        bundles: list[FrameBundle] = []
+        at = 0
+        while at < len(data) or not bundles:
+            measured_ns, count, size = _head(data, _FRAMES, b"TLF1", at)
+            at += _FRAMES.size + count * size
+            if at > len(data):
+                raise CosimError(f"a bundle of {at} bytes came with {len(data)}")
+            payloads = np.frombuffer(data, np.uint8, count * size, at - count * size)
+            bundles.append(cls(measured_ns, payloads.reshape(count, size)))
+        return bundles
 
 
 class Deliveries(NamedTuple):
@@ -234,11 +262,14 @@ class DeliveryBundle:
         return cls(until_ns, table, payloads.reshape(count, size))
 
 
-def _head(data: bytes, layout: struct.Struct, magic: bytes) -> tuple[int, ...]:
-    """Return the numbers that a bundle begins with."""
-    if len(data) < layout.size or data[: len(magic)] != magic:
-        raise CosimError(f"expected a {magic.decode()} bundle, got {len(data)} bytes {data[:8]!r}")
-    _, *numbers = layout.unpack_from(data)
+def _head(data: bytes, layout: struct.Struct, magic: bytes, at: int = 0) -> tuple[int, ...]:
+    """Return the numbers that a bundle begins with, at a place of a message."""
+    begin = data[at : at + 8]
+    if len(data) - at < layout.size or not begin.startswith(magic):
+        raise CosimError(
+            f"expected a {magic.decode()} bundle, got {len(data) - at} bytes {begin!r}"
+        )
+    _, *numbers = layout.unpack_from(data, at)
     return tuple(numbers)
 
 

@@ -1,5 +1,6 @@
 """The same two participants in one process, without HELICS."""
 
+from collections import deque
 from collections.abc import Callable
 
 from tieline.cosim.exchange import first_deliveries
@@ -12,7 +13,7 @@ def run_local(
     clock: Clock,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> None:
-    """Take both participants through every interval, in the order that the federation grants.
+    """Take both participants through every stride, in the order that the federation grants.
 
     Args:
         grid: the grid's side.
@@ -37,17 +38,19 @@ def _run(
     clock: Clock,
     progress: Callable[[str, int, int], None] | None,
 ) -> None:
+    def granted(name: str, k: int) -> None:
+        if progress is not None:
+            progress(name, k, clock.at_ns(k) + lag_ns(name, clock))
+
     [frames] = grid.start()
-    deliveries = first_deliveries(network, clock)
-    for k in range(clock.intervals):
-        if progress is not None:
-            progress(NETWORK, k, clock.at_ns(k) + lag_ns(NETWORK, clock))
-        deliveries.append(network.advance(k, frames))
-        if progress is not None:
-            progress(GRID, k, clock.at_ns(k) + lag_ns(GRID, clock))
-        frames = grid.advance(k, deliveries.popleft())
-    if progress is not None:
-        for name in (NETWORK, GRID):
-            progress(name, clock.intervals, clock.at_ns(clock.intervals) + lag_ns(name, clock))
+    ready = deque(first_deliveries(network, clock))
+    for k in clock.meetings():
+        granted(NETWORK, k)
+        ready.append(network.advance(k, frames))
+        granted(GRID, k)
+        frames = grid.advance(k, ready.popleft())
+    for name in (NETWORK, GRID):
+        granted(name, clock.intervals)
+    network.advance(clock.intervals, frames)
     network.finish()
     grid.finish()

@@ -13,7 +13,7 @@ PART_LIMIT_BYTES = {"tcp": 3_800}
 """Longest message of a core, header included; HELICS 3.6.1 loses longer ones on tcp silently."""
 
 TOGETHER_BYTES = 500_000
-"""Longest message made of several bundles; one bundle may be longer, where the core can."""
+"""Longest message of the other cores, header included; twice as much was measured to pass."""
 
 _PART = struct.Struct("<4sBIHHI")
 _MAGIC = b"TLM2"
@@ -39,8 +39,11 @@ class Part:
 
 
 def split(kind: Kind, k: int, payload: bytes, limit_bytes: int | None) -> list[bytes]:
-    """Return the messages that carry `payload`, none longer than `limit_bytes` (None: no limit)."""
-    room = max(len(payload), 1) if limit_bytes is None else limit_bytes - _PART.size
+    """Return the messages that carry `payload`.
+
+    None is longer than `limit_bytes` (None: `TOGETHER_BYTES`).
+    """
+    room = (TOGETHER_BYTES if limit_bytes is None else limit_bytes) - _PART.size
     count = max(1, -(-len(payload) // room))
     bodies = (payload[index * room : (index + 1) * room] for index in range(count))
     return [

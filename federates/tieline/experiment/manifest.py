@@ -6,6 +6,7 @@ import json
 import pathlib
 import platform
 from collections.abc import Iterable, Mapping
+from functools import cache
 from typing import Any
 
 import tieline
@@ -28,13 +29,21 @@ _PACKAGES = ("helics", "numpy", "scipy", "numba", "pandas", "pyarrow", "pydantic
 
 def versions() -> dict[str, str]:
     """Return the versions of all that a result depends on."""
-    found = {"tieline": tieline.__version__, "python": platform.python_version()}
-    for package in _PACKAGES:
-        try:
-            found[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            found[package] = "not installed"
-    return found | {"platform": f"{platform.system()} {platform.machine()}"}
+    return {
+        "tieline": tieline.__version__,
+        "python": platform.python_version(),
+        **{package: _installed(package) for package in _PACKAGES},
+        "platform": f"{platform.system()} {platform.machine()}",
+    }
+
+
+@cache
+def _installed(package: str) -> str:
+    """Return the version of a package; looking it up takes longer than planning a point of many."""
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"
 
 
 def run_manifest(

@@ -64,6 +64,10 @@ class Surveyor:
     """Checks experiments one after another; what the grid alone decides is looked at once."""
 
     def __init__(self) -> None:
+        # The network brings networkx with it, which `tieline list` should not wait for.
+        from tieline.network.topology import Networks
+
+        self._networks = Networks()
         self._known: dict[str, tuple[Sites, tuple[str, ...], Describe]] = {}
 
     def __call__(self, experiment: Experiment, folder: Path, topology: Path | None) -> Sites:
@@ -78,15 +82,13 @@ class Surveyor:
             InputError: the case is malformed, the experiment names something that it lacks, its
                 power flow diverges, or the network does not connect what it must.
         """
-        from tieline.network.topology import network_spec
-
         sites, of_grid, describe = self._of_grid(experiment, folder)
         findings = list(of_grid)
         lookahead_ns, spec = None, None
         if sites.sensors and sites.controllers:
             sources, destinations = sites.sources(), sites.destinations()
             try:
-                spec = network_spec(experiment.network, topology, sources, destinations)
+                spec = self._networks.spec(experiment.network, topology, sources, destinations)
                 lookahead_ns = spec.lookahead_ns
             except InputError as error:
                 findings += error.findings

@@ -128,10 +128,10 @@ class GridFederate:
 
     def start(self) -> list[bytes]:
         """Return the frames measured at t_0."""
-        return [self._frames(0)]
+        return [self._frames_at(0)]
 
     def advance(self, k: int, received: bytes) -> bytes:
-        """Integrate [t_k, t_k+1], each delivery at its step boundary; return the frames of t_k+1.
+        """Integrate a stride from t_k on, each delivery at its step boundary; return its frames.
 
         Raises:
             TimeContractBroken: as `DeliveryBorder.check`, or a frame's own time tag lies behind
@@ -141,28 +141,34 @@ class GridFederate:
         """
         bundle = DeliveryBundle.from_bytes(received)
         self._border.check(k, bundle)
-        first, last = k * self._per_interval, (k + 1) * self._per_interval
+        first, last = k * self._per_interval, self._run.clock.next_meeting(k) * self._per_interval
+        self._expect(bundle, first, last)
+        instants = range(first + self._per_interval, last + 1, self._per_interval)
+        return b"".join(map(self._frames_at, instants))
+
+    def _expect(self, bundle: DeliveryBundle, first: int, last: int) -> None:
+        """Have the grid expect what controllers will believe from tick to tick of a stride."""
         columns = bundle.columns
         # The first step boundary at or after each arrival.
         ticks = -(-columns.arrival_ns * self._grid.steps_per_second // NS_PER_S)
         readings = self._belief.read(bundle.payloads)
         _check_tags(bundle, readings)
-        seen = 0
-        for tick in sorted({*self._record_ticks(first, last), first, last}):
-            until = int(np.searchsorted(ticks, tick, side="right"))
-            if until > seen:
-                some = slice(seen, until)
-                due, wbar_pu = self._belief.apply(
-                    readings, columns.destination[some], columns.payload[some], ticks[some]
-                )
-                told = np.ones((len(due), len(self._run.case.units)))
-                told[:, self._run.fitted] = wbar_pu
-                self._grid.expect(due, told)
-                seen = until
-            self._grid.advance(tick)
-            if tick % self._per_record == 0 and tick < last:
-                self._note_age()
-        return self._frames(last)
+        records = self._record_ticks(first, last)
+        ends = np.searchsorted(ticks, [*records, last], side="right")
+        dues: list[Integers] = []
+        means: list[Floats] = []
+        for begin, end, tick in zip([0, *ends[:-1]], ends, [*records, None], strict=True):
+            some = slice(begin, end)
+            due, wbar_pu = self._belief.apply(
+                readings, columns.destination[some], columns.payload[some], ticks[some]
+            )
+            dues.append(due)
+            means.append(wbar_pu)
+            if tick is not None:
+                self._note_age(tick)
+        told = np.ones((sum(map(len, dues)), len(self._run.case.units)))
+        told[:, self._run.fitted] = np.concatenate(means)
+        self._grid.expect(np.concatenate(dues), told)
 
     def modulate(self, k: int, commands: Sequence[Command]) -> None:
         """Let stabiliser signals of guests act from t_k on.
@@ -176,7 +182,7 @@ class GridFederate:
 
     def finish(self) -> None:
         """Record the last instant and complete the tables."""
-        self._note_age()
+        self._note_age(self._grid.tick)
         self._recorder.finish()
         self._recorder.close()
         self._write_log()
@@ -217,8 +223,12 @@ class GridFederate:
         start = -(-first // self._per_record) * self._per_record
         return range(start, last, self._per_record)
 
-    def _frames(self, tick: int) -> bytes:
-        """Return the frames of a tick; none when the average needs none, or the run is over."""
+    def _frames_at(self, tick: int) -> bytes:
+        """Integrate up to a tick and return its frames.
+
+        There are none when the average needs none, or the run is over.
+        """
+        self._grid.advance(tick)
         now_ns = tick_ns(tick, self._grid.steps_per_second)
         if self._run.delay_ns is not None or self._grid.ending is not None:
             return FrameBundle(now_ns, np.zeros((0, 0), np.uint8)).to_bytes()
@@ -248,11 +258,11 @@ class GridFederate:
     def _name_of(self, quantity: str, sensor: int) -> str:
         return f"{quantity}.B{self._sensors[sensor]}"
 
-    def _note_age(self) -> None:
-        """Say how old the controllers' data are at the row that the grid writes next."""
+    def _note_age(self, tick: int) -> None:
+        """Say how old the controllers' data are at the row of a tick, the next to be written."""
         if self._grid.ending is not None:
             return
-        now_ns = tick_ns(self._grid.tick, self._grid.steps_per_second)
+        now_ns = tick_ns(tick, self._grid.steps_per_second)
         if self._run.delay_ns is None:
             age_s = self._belief.age_s(now_ns)
         else:

@@ -1,4 +1,4 @@
-"""The network as a participant of the federation: frames in, deliveries out, once an interval."""
+"""The network as a participant of the federation: frames in, deliveries out, once a meeting."""
 
 from pathlib import Path
 from typing import Any
@@ -73,30 +73,32 @@ class NetworkParticipant:
         self._captures = captures
         self._frames = FrameStore(len(spec.sources), len(spec.destinations))
         self._next = 0
+        self._carried = 0
 
     def start(self) -> list[bytes]:
-        """Return the deliveries of the first intervals, in which no frame can matter."""
-        return [self._carry(k) for k in range(self._clock.lead)]
+        """Return the deliveries of the first stride where no frame can matter in it."""
+        return [self._carry()] if self._clock.lead else []
 
     def advance(self, k: int, received: bytes) -> bytes:
-        """Return the deliveries of interval k + lead, given the frames measured at t_k.
+        """Return the deliveries of the next stride, given the frames measured up to t_k.
 
         Raises:
-            TimeContractBroken: the frames were measured at another instant, or an interval is left
-                out or comes again.
+            TimeContractBroken: the frames were measured at other instants than those since the
+                last meeting.
             CosimError: the message is no frame bundle, it does not have one frame of the right
                 size for each source (or none at all), it comes too late for its frames to enter
                 the network in time, or packets are not accounted for.
         """
-        bundle = FrameBundle.from_bytes(received)
-        self._check(k, bundle)
-        self._next += 1
-        sources = np.arange(len(bundle.payloads))
-        if len(sources):
-            self._engine.send(bundle.measured_ns, sources, k, bundle.payloads)
-            self._recorder.add_sent(sources, k)
-            self._frames.keep(k, bundle.payloads)
-        return self._carry(k + self._clock.lead)
+        bundles = FrameBundle.several_from_bytes(received)
+        if k - self._next + 1 != len(bundles):
+            raise TimeContractBroken(
+                f"{NETWORK}: the frames of {len(bundles)} instants came for the intervals from "
+                f"{self._next} to {k}"
+            )
+        for number, bundle in enumerate(bundles, self._next):
+            self._take(number, bundle)
+        self._next = k + 1
+        return self._carry()
 
     def finish(self) -> None:
         """Write the tables.
@@ -117,11 +119,21 @@ class NetworkParticipant:
             self._captures.close()
         self._engine.close()
 
-    def _carry(self, k: int) -> bytes:
-        """Run the network over [t_k, t_k+1] and return its deliveries; nothing after the end."""
-        if k >= self._clock.intervals:
+    def _take(self, k: int, bundle: FrameBundle) -> None:
+        """Hand the frames measured at t_k to the network; those of the very end reach nobody."""
+        self._check(k, bundle)
+        sources = np.arange(len(bundle.payloads))
+        if len(sources) and k < self._clock.intervals:
+            self._engine.send(bundle.measured_ns, sources, k, bundle.payloads)
+            self._recorder.add_sent(sources, k)
+            self._frames.keep(k, bundle.payloads)
+
+    def _carry(self) -> bytes:
+        """Run the network over one more stride and return its deliveries; nothing after the end."""
+        if self._carried == self._clock.intervals:
             return b""
-        until_ns = self._clock.at_ns(k + 1)
+        self._carried = self._clock.next_meeting(self._carried)
+        until_ns = self._clock.at_ns(self._carried)
         outcomes = []
         for stop_ns in self._recorder.stops(until_ns):
             outcomes.append(self._engine.run_until(stop_ns))
@@ -131,10 +143,6 @@ class NetworkParticipant:
         return self._bundle(joined(outcomes), until_ns).to_bytes()
 
     def _check(self, k: int, bundle: FrameBundle) -> None:
-        if k != self._next:
-            raise TimeContractBroken(
-                f"{NETWORK}: the frames of interval {k} came for interval {self._next}"
-            )
         expected_ns = self._clock.at_ns(k)
         if bundle.measured_ns != expected_ns:
             raise TimeContractBroken(

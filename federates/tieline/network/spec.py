@@ -220,6 +220,11 @@ class NetworkSpec:
         leaves = (source.processing_ns + _least(source.jitter) for source in self.sources)
         return min(leaves, default=0)
 
+    @cached_property
+    def mean_unloaded_delay_ns(self) -> float:
+        """The unloaded combined delay averaged over the flows, of which there must be one."""
+        return sum(unloaded_delay_ns(self, flow) for flow in self.flows) / len(self.flows)
+
     def hops(self, route: Route) -> list[tuple[int, Link]]:
         """Return the port and the link of each hop of a route."""
         numbers = [self.ports[pair] for pair in pairwise(route)]

@@ -1,5 +1,6 @@
 """Reads a topology file, refuses a faulty one, and resolves it to a `NetworkSpec`."""
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,10 +20,12 @@ from tieline.network.spec import (
     Route,
     Source,
     direct_spec,
-    unloaded_delay_ns,
 )
 from tieline.units import ns_to_seconds, seconds_to_ns
 from tieline.yaml_lines import load
+
+_NETWORKS_KEPT = 8
+"""A sweep may have thousands, of a megabyte each; those next to each other are mostly alike."""
 
 
 def read_topology(
@@ -75,9 +78,31 @@ def network_spec(
     return direct_spec(sources, destinations, least_ns)
 
 
-def mean_unloaded_delay_ns(spec: NetworkSpec) -> float:
-    """Return the unloaded combined delay averaged over the flows."""
-    return sum(unloaded_delay_ns(spec, flow) for flow in spec.flows) / len(spec.flows)
+class Networks:
+    """Resolves the networks of many experiments: what differs in its mean delay alone, once."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, NetworkSpec] = {}
+
+    def spec(
+        self, settings: NetworkSettings, topology: Path | None, sources: Sites, destinations: Sites
+    ) -> NetworkSpec:
+        """Return the network of an experiment, as `network_spec` does.
+
+        Raises:
+            InputError: as `network_spec`.
+        """
+        if topology is None:
+            return network_spec(settings, topology, sources, destinations)
+        unlengthened = settings.model_copy(update={"mean_delay": None})
+        stated = unlengthened.model_dump(mode="json"), str(topology), sources, destinations
+        key = json.dumps(stated, sort_keys=True)
+        if key not in self._known:
+            found = network_spec(unlengthened, topology, sources, destinations)
+            if len(self._known) == _NETWORKS_KEPT:
+                del self._known[next(iter(self._known))]
+            self._known[key] = found
+        return lengthened(self._known[key], settings, topology)
 
 
 def lengthened(spec: NetworkSpec, settings: NetworkSettings, path: Path) -> NetworkSpec:
@@ -88,7 +113,7 @@ def lengthened(spec: NetworkSpec, settings: NetworkSettings, path: Path) -> Netw
     """
     if settings.mean_delay is None or not spec.flows:
         return spec
-    base_ns = mean_unloaded_delay_ns(spec)
+    base_ns = spec.mean_unloaded_delay_ns
     extra_ns = round(seconds_to_ns(settings.mean_delay) - base_ns)
     if extra_ns < 0:
         raise InputError(
