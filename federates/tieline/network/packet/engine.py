@@ -17,7 +17,7 @@ from tieline.network.engine import (
 )
 from tieline.network.packet import kernel, tcp
 from tieline.network.packet.build import Supplies, laid_out
-from tieline.network.packet.counters import frames_announced, read_counters
+from tieline.network.packet.counters import frames_announced, read_counters, settle
 from tieline.network.packet.endings import Endings
 from tieline.network.packet.events import CROSS, FRAME, KINDS
 from tieline.network.packet.memory import (
@@ -135,7 +135,8 @@ class PacketEngine:
 
     def links(self) -> list[LinkUse]:
         """Return what each link carried up to the last `run_until`, direction by direction."""
-        rows = self._memory.table("ports").tolist()
+        settle(self._memory.cells, self._memory.layout)
+        ports, rows = (self._memory.table(name).tolist() for name in ("ports", "details"))
         before = self._max_queue.tolist()
         return [
             LinkUse(
@@ -146,8 +147,8 @@ class PacketEngine:
                 bytes=rows[port][BYTES],
                 dropped_queue=rows[port][QUEUE_DROPS],
                 dropped_loss=rows[port][LOSS_DROPS],
-                busy_ns=rows[port][BUSY] - max(0, rows[port][FREE_AT] - max(0, self._now_ns)),
-                max_queue=max(before[port], rows[port][MAX_QUEUE]),
+                busy_ns=rows[port][BUSY] - max(0, ports[port][FREE_AT] - max(0, self._now_ns)),
+                max_queue=max(before[port], ports[port][MAX_QUEUE]),
                 dropped_down=rows[port][DOWN_DROPS],
             )
             for (origin, target), port in self._spec.ports.items()
@@ -245,7 +246,7 @@ class PacketEngine:
             if stop == kernel.NEEDS_DRAWS:
                 self._refill()
             elif not kernel.events_with_room(self._memory.cells, self._memory.layout):
-                self._memory.grow()
+                self._memory.make_room()
 
     def _run(self, until_ns: int) -> int:
         """Run the kernel as far as it comes, and take over its records."""

@@ -32,6 +32,7 @@ from tieline.network.packet.memory import (
     ENDED,
     FIRST_FLOW,
     FLOW,
+    FREE_BLOCKS,
     FREE_PACKETS,
     GAP_STREAM,
     HEAP_SIZE,
@@ -65,7 +66,7 @@ from tieline.network.packet.packets import (
     record_end,
 )
 from tieline.network.packet.ports import WAITS, depart, transmit
-from tieline.network.packet.ways import PORT_COLUMNS, plan_of, port_at
+from tieline.network.packet.ways import DETAILS, plan_of, port_at
 
 DONE, NEEDS_ROOM, NEEDS_DRAWS = 0, 1, 2
 
@@ -140,6 +141,7 @@ def events_with_room(cells: Cells, at: Layout) -> int:
     """Return how many events can be processed for certain, whatever they are."""
     free = min(
         cells[at.control + FREE_PACKETS],
+        cells[at.control + FREE_BLOCKS],
         (at.capacity - cells[at.control + HEAP_SIZE]) >> 1,
         at.capacity - cells[at.control + ENDED],
         at.capacity - cells[at.control + TAPPED],
@@ -184,7 +186,7 @@ def _lose(now: int, slot: int, cells: Cells, at: Layout) -> None:
     packet = at.packets + _PACKET * slot
     hop = cells[packet + HOP]
     port = cells[plan_of(hop, cells, at) + HOP_PORT]
-    cells[at.ports + PORT_COLUMNS * port + LOSS_DROPS] += 1
+    cells[at.details + DETAILS * port + LOSS_DROPS] += 1
     _leave(slot, cells, at)
     dropped(now, cells[packet + FLOW], cells[packet + SEQUENCE], hop, LOSS, cells, at)
 

@@ -322,7 +322,7 @@ class TracingEngine(PacketEngine):
         if reaches_ns == copy.hop.reaches_ns:
             return
         port = int(self._memory.plans_of(copy.row)[HOP_PORT])
-        rate_bps = int(self._memory.table("ports")[port, RATE])
+        rate_bps = int(self._memory.table("details")[port, RATE])
         hop = copy.hop
         hop.reaches_ns = reaches_ns
         hop.service_ns = serialisation_ns(hop.size_bytes, rate_bps)
