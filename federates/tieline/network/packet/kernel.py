@@ -35,6 +35,7 @@ from tieline.network.packet.memory import (
     FREE_BLOCKS,
     FREE_PACKETS,
     GAP_STREAM,
+    HEAP_COLUMNS,
     HEAP_SIZE,
     HOP,
     HOP_PORT,
@@ -66,7 +67,8 @@ from tieline.network.packet.packets import (
     record_end,
 )
 from tieline.network.packet.ports import WAITS, depart, transmit
-from tieline.network.packet.ways import DETAILS, plan_of, port_at
+from tieline.network.packet.ways import DETAILS, PORT_COLUMNS, plan_at, plan_of, port_at
+from tieline.prefetch import prefetch
 
 DONE, NEEDS_ROOM, NEEDS_DRAWS = 0, 1, 2
 
@@ -108,7 +110,25 @@ def step(cells: Cells, at: Layout) -> None:
 
 
 @inlined
+def _look_ahead(cells: Cells, at: Layout) -> None:
+    """Ask for what the next events will need: they are the next rows of the heap, or newer."""
+    row = at.heap + HEAP_COLUMNS
+    is_second = 1 * (cells[row + HEAP_COLUMNS + TIME] < cells[row + TIME])
+    item = cells[row + HEAP_COLUMNS * is_second + ITEM]
+    if item & (KINDS - 1) == ARRIVAL:
+        packet = at.packets + (item & ~(KINDS - 1))
+        way = cells[packet + ONWARD]
+        prefetch(cells, plan_at(way, at))
+        prefetch(cells, at.ports + PORT_COLUMNS * port_at(way))
+        prefetch(cells, at.hops + cells[packet + HOP] + 2)
+    row = at.heap + HEAP_COLUMNS * (3 + 2 * is_second)
+    prefetch(cells, at.packets + cells[row + ITEM])
+    prefetch(cells, at.packets + cells[row + HEAP_COLUMNS + ITEM])
+
+
+@inlined
 def _process_first(cells: Cells, at: Layout) -> None:
+    _look_ahead(cells, at)
     now = cells[at.heap + TIME]
     item = cells[at.heap + ITEM]
     kind, number = item & (KINDS - 1), item >> KIND_BITS
