@@ -8,7 +8,7 @@ import numpy as np
 from tieline.network.engine import LINK_DOWN
 from tieline.network.losses import Bernoulli
 from tieline.network.packet.counters import settle
-from tieline.network.packet.events import ARRIVAL, DEPARTURE, KINDS
+from tieline.network.packet.events import ARRIVAL, DEPARTURE, KINDS, items_of
 from tieline.network.packet.memory import (
     BUSY,
     BYTES,
@@ -33,11 +33,10 @@ from tieline.network.packet.memory import (
     HOP_SERVICE,
     IS_DOWN,
     IS_SERVING,
-    ITEM,
     LOSS_STREAM,
     NONE,
-    ORDER,
     PACKETS,
+    RANK,
     RATE,
     SEQUENCE,
     SPECIAL,
@@ -178,7 +177,7 @@ def _cut(now: int, port: int, memory: Memory) -> None:
 def _forget_events(memory: Memory, slots: Cells, port: int) -> None:
     """Remove the events of packets, and the end of a port's transmission."""
     events = memory.events()
-    number, kind = events[:, ITEM] // KINDS, events[:, ITEM] % KINDS
+    number, kind = np.divmod(items_of(events), KINDS)
     is_lost = (kind == ARRIVAL) & np.isin(number, slots)
     memory.put_events(events[~is_lost & ~((kind == DEPARTURE) & (number == port))])
 
@@ -212,14 +211,14 @@ def _set_starts(now: int, port: int, before: Cells, old_rate: int, memory: Memor
     if len(places) == 0:
         return NOTHING
     events = memory.events().copy()
-    slots = events[:, ITEM] // KINDS
-    is_arrival = events[:, ITEM] % KINDS == ARRIVAL
+    slots, kinds = np.divmod(items_of(events), KINDS)
+    is_arrival = kinds == ARRIVAL
     packets = memory.table("packets")
     on_port = np.zeros(len(events), dtype=bool)
     on_port[is_arrival] = memory.plans_of(packets[slots[is_arrival], HOP])[:, HOP_PORT] == port
     # Events are ordered as packets came, and the last to come are those that wait.
     own = np.flatnonzero(on_port)
-    waiting = own[np.argsort(events[own, ORDER])][-len(places) :]
+    waiting = own[np.argsort(events[own, RANK])][-len(places) :]
     old_starts, sizes = waits[places].copy(), waits[places + 1]
     own_plans = memory.plan_numbers_of(packets[slots[waiting], HOP])
     is_sized = plans[own_plans, HOP_SERVICE] == NONE

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from tieline.compiled import compiled_from_zero
 from tieline.network.engine import LINK_COUNTER
-from tieline.network.packet.events import FRAME, KIND_BITS, KINDS
+from tieline.network.packet.events import FRAME, KIND_BITS, KINDS, item_of
 from tieline.network.packet.memory import (
     BUSY,
     BYTES,
@@ -18,11 +18,11 @@ from tieline.network.packet.memory import (
     HOP_BYTES,
     HOP_PORT,
     HOP_SERVICE,
-    ITEM,
     LOSS_DROPS,
     MAX_QUEUE,
     PACKETS,
     QUEUE_DROPS,
+    RANK,
     Cells,
     Layout,
 )
@@ -47,7 +47,7 @@ def frames_announced(flows_of: Cells, cells: Cells, at: Layout) -> int:
     """Return in how many flows frames wait at their PMUs to enter; `flows_of` counts a source's."""
     waiting = 0
     for place in range(cells[at.control + HEAP_SIZE]):
-        item = cells[at.heap + HEAP_COLUMNS * place + ITEM]
+        item = item_of(cells[at.heap + HEAP_COLUMNS * place + RANK])
         if item & (KINDS - 1) == FRAME:
             waiting += flows_of[(item >> KIND_BITS) % at.source_count]
     return waiting

@@ -37,8 +37,11 @@ from tieline.network.packet.memory import (
     GAP_STREAM,
     HEAP_SIZE,
     HOP,
+    ITEM_BITS,
+    LATER,
     LOSS_DROPS,
     MAX_QUEUE,
+    NEXT_ORDER,
     NONE,
     PACKETS,
     QUEUE_DROPS,
@@ -96,7 +99,7 @@ class PacketEngine:
         """
         check_not_late(measured_ns + self.lookahead_ns, self._now_ns)
         items = KINDS * (sequence * len(self._spec.sources) + sources) + FRAME
-        self._announce(self._pmus.ready_ns(measured_ns, sources), items, kernel.FRAME_ORDER)
+        self._announce(self._pmus.ready_ns(measured_ns, sources), LATER + items)
         self._sent += int(self._flows_of[sources].sum())
 
     def run_until(self, until_ns: int) -> Outcome:
@@ -194,8 +197,9 @@ class PacketEngine:
         streams = self._memory.table("streams")
         own = self._memory.table("cross")[:, GAP_STREAM]
         own = own[own != NONE]
-        items = KINDS * np.arange(len(own), dtype=np.int64) + CROSS
-        self._announce(streams[own, FIRST_DRAW], items, base_order=0)
+        orders = np.arange(len(own), dtype=np.int64)
+        self._memory.control[NEXT_ORDER] = len(own)
+        self._announce(streams[own, FIRST_DRAW], (orders << ITEM_BITS) + KINDS * orders + CROSS)
         streams[own, USED] = 1
         # Compiles, where that is still to be done, before the federation waits for an answer.
         self._run(-1)
@@ -209,15 +213,13 @@ class PacketEngine:
         self._collect()
         self._taps.move(starts, at_ns)
 
-    def _announce(
-        self, times_ns: NDArray[np.int64], items: NDArray[np.int64], base_order: int
-    ) -> None:
+    def _announce(self, times_ns: NDArray[np.int64], ranks: NDArray[np.int64]) -> None:
         while (
-            self._memory.control[HEAP_SIZE] + 2 * self._memory.layout.most_packets + len(items)
+            self._memory.control[HEAP_SIZE] + 2 * self._memory.layout.most_packets + len(ranks)
             > self._memory.layout.capacity
         ):
             self._memory.grow()
-        kernel.announce(times_ns, items, base_order, self._memory.cells, self._memory.layout)
+        kernel.announce(times_ns, ranks, self._memory.cells, self._memory.layout)
 
     def _inside(self) -> int:
         """Return the packets inside, each member of a tree counted."""

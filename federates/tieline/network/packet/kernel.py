@@ -8,6 +8,7 @@ and however its caller cuts the time into pieces.
 from tieline.compiled import compiled_from_zero, inlined
 from tieline.network.engine import DELIVERED, LOSS
 from tieline.network.packet import tcp
+from tieline.network.packet.ahead import look_ahead
 from tieline.network.packet.events import (
     ARRIVAL,
     CROSS,
@@ -18,12 +19,12 @@ from tieline.network.packet.events import (
     REPLY,
     TIMER,
     item_of,
-    next_order,
     pop_event,
     push_event,
+    replace_event,
     take,
 )
-from tieline.network.packet.heap import replace_first
+from tieline.network.packet.heap import push
 from tieline.network.packet.memory import (
     ARRIVED,
     COLUMNS,
@@ -35,17 +36,18 @@ from tieline.network.packet.memory import (
     FREE_BLOCKS,
     FREE_PACKETS,
     GAP_STREAM,
-    HEAP_COLUMNS,
     HEAP_SIZE,
     HOP,
     HOP_PORT,
     IP_BYTES,
-    ITEM,
     LOSS_DROPS,
     LOST,
+    MOST_ORDERS,
+    NEXT_ORDER,
     NO_PORT,
     NONE,
     ONWARD,
+    RANK,
     SENT,
     SEQUENCE,
     SIZE_STREAM,
@@ -67,14 +69,9 @@ from tieline.network.packet.packets import (
     record_end,
 )
 from tieline.network.packet.ports import WAITS, depart, transmit
-from tieline.network.packet.ways import DETAILS, PORT_COLUMNS, plan_at, plan_of, port_at
-from tieline.prefetch import prefetch
+from tieline.network.packet.ways import DETAILS, plan_of, port_at
 
 DONE, NEEDS_ROOM, NEEDS_DRAWS = 0, 1, 2
-
-FRAME_ORDER = 1 << 62
-"""Added to a frame's order: it enters after every other event of its instant, whenever it was
-announced, so that sending it earlier or later in wall time changes nothing."""
 
 _FLOW, _SOURCE, _CROSS, _PACKET = (
     COLUMNS[name] for name in ("flows", "sources", "cross", "packets")
@@ -110,27 +107,10 @@ def step(cells: Cells, at: Layout) -> None:
 
 
 @inlined
-def _look_ahead(cells: Cells, at: Layout) -> None:
-    """Ask for what the next events will need: they are the next rows of the heap, or newer."""
-    row = at.heap + HEAP_COLUMNS
-    is_second = 1 * (cells[row + HEAP_COLUMNS + TIME] < cells[row + TIME])
-    item = cells[row + HEAP_COLUMNS * is_second + ITEM]
-    if item & (KINDS - 1) == ARRIVAL:
-        packet = at.packets + (item & ~(KINDS - 1))
-        way = cells[packet + ONWARD]
-        prefetch(cells, plan_at(way, at))
-        prefetch(cells, at.ports + PORT_COLUMNS * port_at(way))
-        prefetch(cells, at.hops + cells[packet + HOP] + 2)
-    row = at.heap + HEAP_COLUMNS * (3 + 2 * is_second)
-    prefetch(cells, at.packets + cells[row + ITEM])
-    prefetch(cells, at.packets + cells[row + HEAP_COLUMNS + ITEM])
-
-
-@inlined
 def _process_first(cells: Cells, at: Layout) -> None:
-    _look_ahead(cells, at)
+    look_ahead(cells, at)
     now = cells[at.heap + TIME]
-    item = cells[at.heap + ITEM]
+    item = item_of(cells[at.heap + RANK])
     kind, number = item & (KINDS - 1), item >> KIND_BITS
     if kind == ARRIVAL:
         _arrive(now, number, cells, at)
@@ -149,11 +129,12 @@ def _process_first(cells: Cells, at: Layout) -> None:
 
 
 @compiled_from_zero
-def announce(times_ns: Cells, items: Cells, base_order: int, cells: Cells, at: Layout) -> None:
+def announce(times_ns: Cells, ranks: Cells, cells: Cells, at: Layout) -> None:
     """Add frames, or the first packets of cross flows, to the events; the heap must have room."""
     for place in range(len(times_ns)):
-        order = base_order + next_order(cells, at)
-        push_event(times_ns[place], order, items[place], cells, at)
+        size = cells[at.control + HEAP_SIZE]
+        push(cells, at.heap, size, times_ns[place], ranks[place])
+        cells[at.control + HEAP_SIZE] = size + 1
 
 
 @inlined
@@ -163,6 +144,7 @@ def events_with_room(cells: Cells, at: Layout) -> int:
         cells[at.control + FREE_PACKETS],
         cells[at.control + FREE_BLOCKS],
         (at.capacity - cells[at.control + HEAP_SIZE]) >> 1,
+        (MOST_ORDERS - cells[at.control + NEXT_ORDER]) >> 1,
         at.capacity - cells[at.control + ENDED],
         at.capacity - cells[at.control + TAPPED],
     )
@@ -181,8 +163,7 @@ def _arrive(now: int, slot: int, cells: Cells, at: Layout) -> None:
     elif port >= 0:
         arrival_ns = transmit(now, slot, hop, way, cells, at)
         if arrival_ns >= 0:
-            size = cells[at.control + HEAP_SIZE]
-            replace_first(cells, at.heap, size, arrival_ns, next_order(cells, at), 8 * slot)
+            replace_event(arrival_ns, ARRIVAL, slot, cells, at)
         elif arrival_ns == WAITS:
             pop_event(cells, at)
         else:
@@ -228,8 +209,7 @@ def _reach_target(now: int, flow: int, sequence: int, cells: Cells, at: Layout) 
     if connection != NONE:
         tcp.on_packet(now, flow, connection, sequence, cells, at)
     elif cells[row + REPLY_FLOW] != NONE:
-        item = item_of(REPLY, cells[row + REPLY_FLOW])
-        push_event(now + cells[row + THINK], next_order(cells, at), item, cells, at)
+        push_event(now + cells[row + THINK], REPLY, cells[row + REPLY_FLOW], cells, at)
 
 
 @inlined
@@ -254,9 +234,7 @@ def _send_cross(now: int, number: int, cells: Cells, at: Layout) -> None:
         )
     next_ns = now + take(cells[row + GAP_STREAM], cells, at)
     # The packet's own event is later in the heap's order, so this one still stands first.
-    events = cells[at.control + HEAP_SIZE]
-    item = item_of(CROSS, number)
-    replace_first(cells, at.heap, events, next_ns, next_order(cells, at), item)
+    replace_event(next_ns, CROSS, number, cells, at)
 
 
 @compiled_from_zero

@@ -32,6 +32,12 @@ PORT_BITS = 24
 PORT_MASK = (1 << PORT_BITS) - 1
 """An entry of `hops` is the number of a plan above the number of its port less `FORK`."""
 
+ITEM_BITS = 27
+ITEM_MASK = (1 << ITEM_BITS) - 1
+LATER = 1 << 62
+MOST_ORDERS = LATER >> ITEM_BITS
+NEVER = (1 << 63) - 1
+
 # control: one row.
 HEAP_SIZE, NEXT_ORDER, FREE_PACKETS, ENDED, TAPPED, WANTS_DRAWS, FREE_BLOCK, FREE_BLOCKS = range(8)
 
@@ -96,8 +102,9 @@ USED, FIRST_DRAW = range(2)
 # next block. A plain port always has one; free ones are a list of their own.
 ENTRY, NEXT_BLOCK = 2, 6
 
-# heap: pending events.
-TIME, ORDER, ITEM = range(3)
+# heap: pending events. A rank decides between events of one instant and says what happens: its last
+# ITEM_BITS are an item, what is above them an order number; a frame's is its item above LATER.
+TIME, RANK = range(2)
 
 # packets inside the network, by slot; IP_BYTES only where packets of a flow differ in size. ONWARD
 # is what `hops` has for the hop after this one: on arrival plan and port are fetched side by side.
@@ -131,16 +138,20 @@ COLUMNS = {
     "received": 2,
     "streams": 1 + 2 * CHUNK,
     "blocks": LINE,
-    "heap": 3,
+    "heap": 2,
     "packets": 8,
     "free": 1,
     "ended": 4,
     "taps": 7,
 }
-GROWING = ("heap", "packets", "free", "ended")
-"""The tables with a row for each packet that may be inside; with links tapped, `taps` is one."""
+GROWING = ("packets", "free", "ended")
+"""The tables with a row for each packet that may be inside; with links tapped, `taps` is one, and
+`heap` has some more."""
 
 HEAP_COLUMNS = COLUMNS["heap"]
+
+_BEFORE_HEAP, _AROUND_HEAP = 3, 8
+"""Rows before the first event, so that each four below one begin a line, and of no event in all."""
 
 
 class Layout(NamedTuple):
@@ -233,15 +244,16 @@ class Memory:
         return np.flatnonzero(~is_free)
 
     def events(self) -> Cells:
-        """Return the pending events as a view (events, 3)."""
-        return self.table("heap")[: self.control[HEAP_SIZE]]
+        """Return the pending events as a view (events, 2)."""
+        return self.table("heap")[_BEFORE_HEAP:][: self.control[HEAP_SIZE]]
 
     def put_events(self, events: Cells) -> None:
         """Replace the pending events by as many or fewer."""
         # Rows in ascending order are a heap.
-        in_order = events[np.lexsort((events[:, ORDER], events[:, TIME]))]
-        self.table("heap")[: len(in_order)] = in_order
+        in_order = events[np.lexsort((events[:, RANK], events[:, TIME]))]
+        self.events()[:, TIME] = NEVER
         self.control[HEAP_SIZE] = len(in_order)
+        self.events()[:] = in_order
 
     def free(self, slots: Cells) -> None:
         """Take packets out of the network."""
@@ -269,18 +281,28 @@ class Memory:
         return np.array(places, dtype=np.int64)
 
     def make_room(self) -> None:
-        """Grow what is too short for any event: what holds those that wait, or all packets.
+        """Grow what is too short for any event: order numbers, what holds those that wait, or all.
 
         Raises:
             CosimError: as `grow`.
         """
-        if self.control[FREE_BLOCKS] >= self.layout.most_packets:
+        if MOST_ORDERS - self.control[NEXT_ORDER] < 2 * self.layout.most_packets:
+            self._number_anew()
+        elif self.control[FREE_BLOCKS] < self.layout.most_packets:
+            taken = self._rows["blocks"]
+            self._rows["blocks"] *= 2
+            self._allocate(self._tables)
+            self._free_blocks(taken)
+        else:
             self.grow()
-            return
-        taken = self._rows["blocks"]
-        self._rows["blocks"] *= 2
-        self._allocate(self._tables)
-        self._free_blocks(taken)
+
+    def _number_anew(self) -> None:
+        """Give the pending events the first order numbers, in the order of those that they have."""
+        ranks = self.events()[:, RANK]
+        own = np.flatnonzero(ranks < LATER)
+        own = own[np.argsort(ranks[own])]
+        ranks[own] = (np.arange(len(own)) << ITEM_BITS) + (ranks[own] & ITEM_MASK)
+        self.control[NEXT_ORDER] = len(own)
 
     def grow(self) -> None:
         """Double the room for packets and events.
@@ -311,16 +333,20 @@ class Memory:
         """Lay the tables out anew, with the contents that some of them have."""
         starts = {}
         size = 0
+        self._rows["heap"] = self._rows["packets"] + _AROUND_HEAP
         for name, columns in COLUMNS.items():
             starts[name] = size
             size += -(-self._rows[name] * columns // LINE) * LINE
         whole: Cells = np.zeros(size + LINE, dtype=np.int64)
         aligned = -(whole.ctypes.data // whole.itemsize) % LINE
         self.cells = whole[aligned : aligned + size]
-        self.layout = Layout(**starts, capacity=self._rows["heap"], **self._bounds)
+        events = {"heap": starts["heap"] + _BEFORE_HEAP * HEAP_COLUMNS}
+        bounds = {"capacity": self._rows["packets"]} | self._bounds
+        self.layout = Layout(**starts | events | bounds)
         self._tables = {
             name: self.cells[start : start + self._rows[name] * columns].reshape(-1, columns)
             for (name, columns), start in zip(COLUMNS.items(), starts.values(), strict=True)
         }
+        self.table("heap")[:, TIME] = NEVER
         for name, content in contents.items():
             self.table(name)[: len(content)] = content

@@ -7,7 +7,7 @@ transmission, because only then it is known which packet is next.
 """
 
 from tieline.compiled import compiled_from_zero, inlined
-from tieline.network.packet.events import DEPARTURE, item_of, next_order, push_event, take
+from tieline.network.packet.events import ARRIVAL, DEPARTURE, push_event, take
 from tieline.network.packet.memory import (
     BUSY,
     BYTES,
@@ -138,7 +138,7 @@ def depart(now: int, number: int, cells: Cells, at: Layout) -> None:
     if cells[port + WAITING] > 0:
         slot = _next_waiting(port, cells, at)
         arrival_ns = _serve(now, slot, port, cells, at)
-        push_event(arrival_ns, next_order(cells, at), item_of(0, slot), cells, at)
+        push_event(arrival_ns, ARRIVAL, slot, cells, at)
 
 
 @inlined
@@ -304,8 +304,7 @@ def _serve(now: int, slot: int, port: int, cells: Cells, at: Layout) -> int:
         service_ns = _service_ns(size, port, cells, at)
     _occupy(now, service_ns, size, port, cells, at)
     cells[details_of(port, at) + IS_SERVING] = 1
-    item = item_of(DEPARTURE, cells[plan + HOP_PORT])
-    push_event(now + service_ns, next_order(cells, at), item, cells, at)
+    push_event(now + service_ns, DEPARTURE, cells[plan + HOP_PORT], cells, at)
     return _reach(now, service_ns, size, slot, port, cells, at)
 
 
