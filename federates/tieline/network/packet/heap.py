@@ -58,16 +58,27 @@ def below_of(heap: int, row: int) -> int:
 @inlined
 def first_of_four(cells: Cells, row: int) -> int:
     """Return the row of the event that comes first of four that follow each other."""
+    a_ns, b_ns = cells[row + TIME], cells[row + HEAP_COLUMNS + TIME]
+    c_ns, d_ns = cells[row + 2 * HEAP_COLUMNS + TIME], cells[row + 3 * HEAP_COLUMNS + TIME]
+    left_ns, right_ns = min(a_ns, b_ns), min(c_ns, d_ns)
+    least_ns = min(left_ns, right_ns)
     # As numbers, not as branches: which comes first is a matter of chance.
-    one = row + HEAP_COLUMNS * _is_second(cells, row, row + HEAP_COLUMNS)
-    three = row + 2 * HEAP_COLUMNS
-    two = three + HEAP_COLUMNS * _is_second(cells, three, three + HEAP_COLUMNS)
-    return one + (two - one) * _is_second(cells, one, two)
+    of_left, of_right = 1 * (b_ns < a_ns), 2 + (d_ns < c_ns)
+    place = of_left ^ ((of_left ^ of_right) & (-1 * (right_ns < left_ns)))
+    if 1 * (a_ns == least_ns) + (b_ns == least_ns) + (c_ns == least_ns) + (d_ns == least_ns) > 1:
+        place = _first_of_equals(least_ns, cells, row)
+    return row + HEAP_COLUMNS * place
 
 
-@inlined
-def _is_second(cells: Cells, one: int, two: int) -> int:
-    return 1 * _precedes(cells, cells[two + TIME], cells[two + RANK], one)
+@compiled_from_zero
+def _first_of_equals(least_ns: int, cells: Cells, row: int) -> int:
+    """Return which of four events of an instant, or of those that have it, has the least rank."""
+    place, least = 0, NEVER
+    for other in range(4):
+        rank = cells[row + HEAP_COLUMNS * other + RANK]
+        if cells[row + HEAP_COLUMNS * other + TIME] == least_ns and rank < least:
+            place, least = other, rank
+    return place
 
 
 @inlined
