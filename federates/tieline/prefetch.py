@@ -1,18 +1,18 @@
 """Asks the processor for a line of memory before it is needed, from compiled code.
 
-Code that goes from table to table by numbers that it has just read waits for each of them, where
-the tables exceed the nearer caches. A line that is asked for comes while the code does other things.
+Code that goes from table to table by numbers that it has just read waits for each of them where the
+tables exceed the nearer caches. A line that is asked for comes while the code does other things.
 """
 
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 from tieline.compiled import IS_ON
-from numpy.typing import NDArray
-import numpy as np
 
 Cells = NDArray[np.int64]
 

@@ -207,8 +207,7 @@ class PacketEngine:
     def _change(self) -> None:
         """Do the next change of the network."""
         at_ns = self._changes.next_ns
-        while self._inside() > self._memory.layout.capacity:
-            self._memory.grow()
+        self._memory.hold_records(self._inside())
         starts = self._changes.apply(self._memory)
         self._collect()
         self._taps.move(starts, at_ns)

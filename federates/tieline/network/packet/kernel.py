@@ -145,8 +145,8 @@ def events_with_room(cells: Cells, at: Layout) -> int:
         cells[at.control + FREE_BLOCKS],
         (at.capacity - cells[at.control + HEAP_SIZE]) >> 1,
         (MOST_ORDERS - cells[at.control + NEXT_ORDER]) >> 1,
-        at.capacity - cells[at.control + ENDED],
-        at.capacity - cells[at.control + TAPPED],
+        at.records - cells[at.control + ENDED],
+        at.records - cells[at.control + TAPPED],
     )
     return free // at.most_packets
 

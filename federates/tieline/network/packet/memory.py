@@ -144,9 +144,8 @@ COLUMNS = {
     "ended": 4,
     "taps": 7,
 }
-GROWING = ("packets", "free", "ended")
-"""The tables with a row for each packet that may be inside; with links tapped, `taps` is one, and
-`heap` has some more."""
+GROWING = ("packets", "free")
+"""The tables with a row for each packet that may be inside; `heap` has some more."""
 
 HEAP_COLUMNS = COLUMNS["heap"]
 
@@ -159,9 +158,9 @@ class Layout(NamedTuple):
 
     `free` holds the free slots of `packets`; `received`, connection after connection, a ring of
     segments: whether one has come out of order, and the frame that it carries. `capacity` is the
-    number of rows of each growing table, and `most_packets` the most packets that one event can
-    make. Flows from `pmu_flows` on have a row of `cross`; `first_tree` is the first flow that is a
-    tree.
+    number of rows of each growing table, `records` that of `ended`, and of `taps` if there are any;
+    `most_packets` is the most packets that one event can make. Flows from `pmu_flows` on have a row
+    of `cross`; `first_tree` is the first flow that is a tree.
     """
 
     control: int
@@ -187,6 +186,7 @@ class Layout(NamedTuple):
     ended: int
     taps: int
     capacity: int
+    records: int
     source_count: int
     pmu_flows: int
     first_tree: int
@@ -199,7 +199,7 @@ class Memory:
     Args:
         tables: the contents of the tables of fixed size, (rows, columns) each; those that are not
             given have one row of zeros (`control`) or are empty. `blocks` has the plain ports' own.
-        capacity: rows of the growing tables at first, and free blocks.
+        capacity: rows of the growing tables at first, records, and free blocks.
         bounds: the layout's counts, `source_count` to `most_packets`.
         is_tapped: whether a link is listened to.
     """
@@ -210,8 +210,8 @@ class Memory:
         self._bounds = bounds
         self._rows = {name: len(tables.get(name, ())) for name in COLUMNS}
         self._rows["control"] = 1
-        self._growing = (*GROWING, "taps") if is_tapped else GROWING
-        self._rows.update(dict.fromkeys(self._growing, capacity))
+        self._records = ("ended", "taps") if is_tapped else ("ended",)
+        self._rows.update(dict.fromkeys((*GROWING, *self._records), capacity))
         taken = self._rows["blocks"]
         self._rows["blocks"] += capacity
         self._allocate(tables)
@@ -316,9 +316,16 @@ class Memory:
                 f"more than {old} packets are inside the network: lower the queues, the "
                 "propagation times or the rate of the cross traffic"
             )
-        self._rows.update(dict.fromkeys(self._growing, 2 * old))
+        self._rows.update(dict.fromkeys(GROWING, 2 * old))
         self._allocate(self._tables)
         self.free(np.arange(old, 2 * old))
+
+    def hold_records(self, count: int) -> None:
+        """Make room for so many records, and one event's, before they are collected."""
+        if count + self.layout.most_packets > self.layout.records:
+            rows = count + self.layout.most_packets
+            self._rows.update(dict.fromkeys(self._records, rows))
+            self._allocate(self._tables)
 
     def _free_blocks(self, first: int) -> None:
         """Add the rows of `blocks` from one on to those that are free."""
@@ -341,7 +348,7 @@ class Memory:
         aligned = -(whole.ctypes.data // whole.itemsize) % LINE
         self.cells = whole[aligned : aligned + size]
         events = {"heap": starts["heap"] + _BEFORE_HEAP * HEAP_COLUMNS}
-        bounds = {"capacity": self._rows["packets"]} | self._bounds
+        bounds = {"capacity": self._rows["packets"], "records": self._rows["ended"]} | self._bounds
         self.layout = Layout(**starts | events | bounds)
         self._tables = {
             name: self.cells[start : start + self._rows[name] * columns].reshape(-1, columns)
