@@ -16,7 +16,7 @@ from tieline.network.draws import CHUNK
 Cells = NDArray[np.int64]
 
 MAX_PACKETS = 1 << 22
-"""Packets, or pending events, that are ever held: about 500 MB. Queues bound them far below."""
+"""Packets, or pending events, that are ever held: about 370 MB. Queues bound them far below."""
 
 LINE = 8
 """Cells of a line of the processor's cache: tables begin with one, and the rows that every packet
