@@ -15,6 +15,7 @@ _HALF_BITS = 6
 _HALF = 1 << _HALF_BITS
 _LAST_SHIFT = 26
 _MOST = (1 << 16) - 1
+_FIRST_PARTS = 2
 BINS = _HALF * _LAST_SHIFT + 2 * _HALF
 """Bins of one flow; the last ends at 2.4 hours and takes what is longer, too."""
 
@@ -43,21 +44,26 @@ class Histograms:
     """The bins of many flows, which a flow has only where its delays are, 64 at a time.
 
     Attributes:
-        block_of: (flows, BINS / 64) the row of `counts` that holds 64 bins of a flow, or -1.
+        block_of: (flows, parts) the row of `counts` that holds 64 bins of a flow, or -1; there are
+            as many parts as the longest delay needs.
         counts: (rows, 64) the bins; rows are taken in order.
         carries: (rows, 64) how often each bin has been full and begun anew, or (0, 64) if none has.
-        used: (1,) how many rows are taken.
+        used: (2,) how many rows are taken, and the last part that was needed.
     """
 
     def __init__(self, flows: int) -> None:
-        self.block_of = np.full((flows, BINS // _HALF), -1, dtype=np.int32)
+        self.block_of = np.full((flows, _FIRST_PARTS), -1, dtype=np.int32)
         self.counts = np.zeros((max(1, flows), _HALF), dtype=np.uint16)
         self.carries = np.zeros((0, _HALF), dtype=np.uint32)
-        self.used = np.zeros(1, dtype=np.int64)
+        self.used = np.zeros(2, dtype=np.int64)
 
     def grow(self) -> None:
-        """Make room for what `count` had none for: half as many rows again, or carries."""
-        old = len(self.counts)
+        """Make room for what `count` had none for: parts, half as many rows again, or carries."""
+        old, parts = len(self.counts), self.block_of.shape[1]
+        if self.used[1] >= parts:
+            more = self.used[1] + 1 - parts
+            self.block_of = np.pad(self.block_of, ((0, 0), (0, more)), constant_values=-1)
+            return
         if self.used[0] < old:
             self.carries = np.zeros((old, _HALF), dtype=np.uint32)
             return
@@ -88,6 +94,9 @@ def count(
 ) -> bool:
     """Count an excess of a flow; return whether there was room for that."""
     number = bin_of(excess_ns)
+    if number >> _HALF_BITS >= block_of.shape[1]:
+        used[1] = number >> _HALF_BITS
+        return False
     block = block_of[flow, number >> _HALF_BITS]
     if block < 0:
         block = used[0]

@@ -8,7 +8,7 @@ import numpy as np
 from tieline.network.engine import LINK_DOWN
 from tieline.network.losses import Bernoulli
 from tieline.network.packet.counters import settle
-from tieline.network.packet.events import ARRIVAL, DEPARTURE, KINDS, items_of
+from tieline.network.packet.kinds import ARRIVAL, DEPARTURE, KINDS, items_of
 from tieline.network.packet.memory import (
     BUSY,
     BYTES,

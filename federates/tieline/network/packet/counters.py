@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from tieline.compiled import compiled_from_zero
 from tieline.network.engine import LINK_COUNTER
-from tieline.network.packet.events import FRAME, KIND_BITS, KINDS, item_of
+from tieline.network.packet.kinds import FRAME, KIND_BITS, KINDS, item_of
 from tieline.network.packet.memory import (
     BUSY,
     BYTES,

@@ -19,7 +19,7 @@ from tieline.network.packet import kernel, tcp
 from tieline.network.packet.build import Supplies, laid_out
 from tieline.network.packet.counters import frames_announced, read_counters, settle
 from tieline.network.packet.endings import Endings
-from tieline.network.packet.events import CROSS, FRAME, KINDS
+from tieline.network.packet.kinds import CROSS, FRAME, KINDS
 from tieline.network.packet.memory import (
     ARRIVED,
     BUSY,

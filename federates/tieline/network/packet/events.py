@@ -1,37 +1,20 @@
-"""Events and random numbers of the packet kernel, for its other parts.
-
-An event's item says what happens: 8 times a number plus one of the kinds below. A frame enters
-after every other event of its instant, and frames in the order of their items, whenever they were
-announced, so that sending them earlier or later in wall time changes nothing.
-"""
-
-import numpy as np
+"""Events and random numbers of the packet kernel, for its other parts."""
 
 from tieline.compiled import inlined
 from tieline.network.draws import CHUNK
 from tieline.network.packet.heap import pop, push, replace_first
+from tieline.network.packet.kinds import KIND_BITS
 from tieline.network.packet.memory import (
     COLUMNS,
     FIRST_DRAW,
     HEAP_SIZE,
     ITEM_BITS,
-    ITEM_MASK,
-    LATER,
     NEXT_ORDER,
-    RANK,
     USED,
     WANTS_DRAWS,
     Cells,
     Layout,
 )
-
-ARRIVAL, CROSS, FRAME, DEPARTURE, TIMER, REPLY = range(6)
-"""The packet in a slot reaches the end of its link; a cross flow sends; a frame leaves its source
-(sequence times sources, plus the source); a port with a server ends a transmission; a connection's
-timer ends; a flow sends the reply to a request."""
-
-KIND_BITS = 3
-KINDS = 1 << KIND_BITS
 
 _STREAM = COLUMNS["streams"]
 
@@ -40,7 +23,7 @@ _STREAM = COLUMNS["streams"]
 def push_event(time_ns: int, kind: int, number: int, cells: Cells, at: Layout) -> None:
     """Add an event."""
     size = cells[at.control + HEAP_SIZE]
-    push(cells, at.heap, size, time_ns, _next_rank(kind, number, cells, at))
+    push(size, time_ns, _next_rank(kind, number, cells, at), cells, at)
     cells[at.control + HEAP_SIZE] = size + 1
 
 
@@ -48,26 +31,14 @@ def push_event(time_ns: int, kind: int, number: int, cells: Cells, at: Layout) -
 def replace_event(time_ns: int, kind: int, number: int, cells: Cells, at: Layout) -> None:
     """Put an event in the place of the first."""
     size = cells[at.control + HEAP_SIZE]
-    replace_first(cells, at.heap, size, time_ns, _next_rank(kind, number, cells, at))
+    replace_first(size, time_ns, _next_rank(kind, number, cells, at), cells, at)
 
 
 @inlined
 def pop_event(cells: Cells, at: Layout) -> None:
     """Remove the first event."""
-    pop(cells, at.heap, cells[at.control + HEAP_SIZE])
+    pop(cells[at.control + HEAP_SIZE], cells, at)
     cells[at.control + HEAP_SIZE] -= 1
-
-
-@inlined
-def item_of(rank: int) -> int:
-    """Return the item of an event, given its rank."""
-    return rank - LATER if rank >= LATER else rank & ITEM_MASK
-
-
-def items_of(events: Cells) -> Cells:
-    """Return (events,) the items of some events (events, 2)."""
-    ranks = events[:, RANK]
-    return np.where(ranks >= LATER, ranks - LATER, ranks & ITEM_MASK)
 
 
 @inlined

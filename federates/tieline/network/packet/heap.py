@@ -7,13 +7,14 @@ processor's cache; behind the last event at least four rows have the time `NEVER
 """
 
 from tieline.compiled import compiled_from_zero, inlined
-from tieline.network.packet.memory import HEAP_COLUMNS, NEVER, RANK, TIME, Cells
+from tieline.network.packet.ahead import ask_for_packet, ask_for_port
+from tieline.network.packet.memory import HEAP_COLUMNS, NEVER, RANK, TIME, Cells, Layout
 
 
 @compiled_from_zero
-def push(cells: Cells, heap: int, size: int, time_ns: int, rank: int) -> None:
+def push(size: int, time_ns: int, rank: int, cells: Cells, at: Layout) -> None:
     """Add an event to a heap of `size` events; the table must have a row more than that."""
-    place = size
+    heap, place = at.heap, size
     while place > 0:
         above = heap + HEAP_COLUMNS * ((place - 1) >> 2)
         if not _precedes(cells, time_ns, rank, above):
@@ -24,39 +25,48 @@ def push(cells: Cells, heap: int, size: int, time_ns: int, rank: int) -> None:
 
 
 @compiled_from_zero
-def replace_first(cells: Cells, heap: int, size: int, time_ns: int, rank: int) -> None:
-    """Put an event in the place of the first and restore the order: a pop and a push in one."""
-    row = heap
-    end = heap + HEAP_COLUMNS * size
-    below = below_of(heap, row)
+def replace_first(size: int, time_ns: int, rank: int, cells: Cells, at: Layout) -> None:
+    """Put an event in the place of the first and restore the order: a pop and a push in one.
+
+    For events that rise to the upper levels, what they need is asked for.
+    """
+    row, level = at.heap, 0
+    end = at.heap + HEAP_COLUMNS * size
+    below = _below(row, at)
     while below < end:
-        first = first_of_four(cells, below)
+        first = _first_of_four(cells, below)
         if _precedes(cells, time_ns, rank, first):
             break
-        _write(cells, row, cells[first + TIME], cells[first + RANK])
+        risen = cells[first + RANK]
+        _write(cells, row, cells[first + TIME], risen)
+        if level == 1:
+            ask_for_port(risen, cells, at)
+        elif level == 2:
+            ask_for_packet(risen, cells, at)
         row = first
-        below = below_of(heap, row)
+        level += 1
+        below = _below(row, at)
     _write(cells, row, time_ns, rank)
 
 
 @compiled_from_zero
-def pop(cells: Cells, heap: int, size: int) -> None:
+def pop(size: int, cells: Cells, at: Layout) -> None:
     """Remove the first of `size` events, leaving `size` - 1."""
-    last = heap + HEAP_COLUMNS * (size - 1)
+    last = at.heap + HEAP_COLUMNS * (size - 1)
     time_ns, rank = cells[last + TIME], cells[last + RANK]
     cells[last + TIME] = NEVER
     if size > 1:
-        replace_first(cells, heap, size - 1, time_ns, rank)
+        replace_first(size - 1, time_ns, rank, cells, at)
 
 
 @inlined
-def below_of(heap: int, row: int) -> int:
+def _below(row: int, at: Layout) -> int:
     """Return where the four rows below one begin."""
-    return heap + HEAP_COLUMNS + 4 * (row - heap)
+    return at.heap + HEAP_COLUMNS + 4 * (row - at.heap)
 
 
 @inlined
-def first_of_four(cells: Cells, row: int) -> int:
+def _first_of_four(cells: Cells, row: int) -> int:
     """Return the row of the event that comes first of four that follow each other."""
     a_ns, b_ns = cells[row + TIME], cells[row + HEAP_COLUMNS + TIME]
     c_ns, d_ns = cells[row + 2 * HEAP_COLUMNS + TIME], cells[row + 3 * HEAP_COLUMNS + TIME]

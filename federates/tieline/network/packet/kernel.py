@@ -8,8 +8,9 @@ and however its caller cuts the time into pieces.
 from tieline.compiled import compiled_from_zero, inlined
 from tieline.network.engine import DELIVERED, LOSS
 from tieline.network.packet import tcp
-from tieline.network.packet.ahead import look_ahead
-from tieline.network.packet.events import (
+from tieline.network.packet.events import pop_event, push_event, replace_event, take
+from tieline.network.packet.heap import push
+from tieline.network.packet.kinds import (
     ARRIVAL,
     CROSS,
     DEPARTURE,
@@ -19,12 +20,7 @@ from tieline.network.packet.events import (
     REPLY,
     TIMER,
     item_of,
-    pop_event,
-    push_event,
-    replace_event,
-    take,
 )
-from tieline.network.packet.heap import push
 from tieline.network.packet.memory import (
     ARRIVED,
     COLUMNS,
@@ -108,7 +104,6 @@ def step(cells: Cells, at: Layout) -> None:
 
 @inlined
 def _process_first(cells: Cells, at: Layout) -> None:
-    look_ahead(cells, at)
     now = cells[at.heap + TIME]
     item = item_of(cells[at.heap + RANK])
     kind, number = item & (KINDS - 1), item >> KIND_BITS
@@ -133,7 +128,7 @@ def announce(times_ns: Cells, ranks: Cells, cells: Cells, at: Layout) -> None:
     """Add frames, or the first packets of cross flows, to the events; the heap must have room."""
     for place in range(len(times_ns)):
         size = cells[at.control + HEAP_SIZE]
-        push(cells, at.heap, size, times_ns[place], ranks[place])
+        push(size, times_ns[place], ranks[place], cells, at)
         cells[at.control + HEAP_SIZE] = size + 1
 
 

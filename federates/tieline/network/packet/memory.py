@@ -290,7 +290,7 @@ class Memory:
             self._number_anew()
         elif self.control[FREE_BLOCKS] < self.layout.most_packets:
             taken = self._rows["blocks"]
-            self._rows["blocks"] *= 2
+            self._rows["blocks"] += self._rows["packets"]
             self._allocate(self._tables)
             self._free_blocks(taken)
         else:
@@ -305,20 +305,21 @@ class Memory:
         self.control[NEXT_ORDER] = len(own)
 
     def grow(self) -> None:
-        """Double the room for packets and events.
+        """Make room for half as many packets and events again.
 
         Raises:
             CosimError: it would exceed `MAX_PACKETS`.
         """
         old = self.layout.capacity
-        if 2 * old > MAX_PACKETS:
+        if old == MAX_PACKETS:
             raise CosimError(
                 f"more than {old} packets are inside the network: lower the queues, the "
                 "propagation times or the rate of the cross traffic"
             )
-        self._rows.update(dict.fromkeys(GROWING, 2 * old))
+        new = min(old * 3 // 2, MAX_PACKETS)
+        self._rows.update(dict.fromkeys(GROWING, new))
         self._allocate(self._tables)
-        self.free(np.arange(old, 2 * old))
+        self.free(np.arange(old, new))
 
     def hold_records(self, count: int) -> None:
         """Make room for so many records, and one event's, before they are collected."""

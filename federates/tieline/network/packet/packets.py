@@ -2,7 +2,8 @@
 
 from tieline.compiled import compiled_from_zero, inlined
 from tieline.network.engine import DELIVERED, LINK_DOWN, QUEUE_FULL
-from tieline.network.packet.events import ARRIVAL, push_event, take
+from tieline.network.packet.events import push_event, take
+from tieline.network.packet.kinds import ARRIVAL
 from tieline.network.packet.memory import (
     ARRIVED,
     COLUMNS,

@@ -7,7 +7,8 @@ transmission, because only then it is known which packet is next.
 """
 
 from tieline.compiled import compiled_from_zero, inlined
-from tieline.network.packet.events import ARRIVAL, DEPARTURE, push_event, take
+from tieline.network.packet.events import push_event, take
+from tieline.network.packet.kinds import ARRIVAL, DEPARTURE
 from tieline.network.packet.memory import (
     BUSY,
     BYTES,

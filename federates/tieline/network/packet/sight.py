@@ -1,6 +1,6 @@
 """Finds one packet in the kernel's memory."""
 
-from tieline.network.packet.events import ARRIVAL, KINDS, items_of
+from tieline.network.packet.kinds import ARRIVAL, KINDS, items_of
 from tieline.network.packet.memory import (
     END_FORKS,
     END_MEMBERS,

@@ -12,7 +12,8 @@ Windows are kept in 1/1024 segments, times in nanoseconds.
 
 from tieline.compiled import compiled_from_zero, inlined
 from tieline.network.engine import DELIVERED, QUEUE_FULL
-from tieline.network.packet.events import TIMER, push_event
+from tieline.network.packet.events import push_event
+from tieline.network.packet.kinds import TIMER
 from tieline.network.packet.memory import (
     COLUMNS,
     CONNECTION_COLUMNS,

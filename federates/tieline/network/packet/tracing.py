@@ -15,7 +15,8 @@ from tieline.network.engine import DELIVERED, LINK_DOWN, Outcome
 from tieline.network.fate import Draw, Fate, Hop
 from tieline.network.packet import kernel, tcp
 from tieline.network.packet.engine import PacketEngine
-from tieline.network.packet.events import ARRIVAL, FRAME, KINDS, items_of, pop_event
+from tieline.network.packet.events import pop_event
+from tieline.network.packet.kinds import ARRIVAL, FRAME, KINDS, items_of
 from tieline.network.packet.looking import (
     Port,
     hop_of,
