@@ -56,6 +56,7 @@ def frames_announced(flows_of: Cells, cells: Cells, at: Layout) -> int:
 @compiled_from_zero
 def settle(cells: Cells, at: Layout) -> None:
     """Add what plain packets have carried, by their plans, to the counters of the ports."""
+    # `forks` is the table after `plans`, whose rows fill whole lines.
     for plan in range(at.plans, at.forks, _PLAN):
         carried = cells[plan + CARRIED]
         if carried > 0:

@@ -36,7 +36,10 @@ ITEM_BITS = 27
 ITEM_MASK = (1 << ITEM_BITS) - 1
 LATER = 1 << 62
 MOST_ORDERS = LATER >> ITEM_BITS
+"""What a rank is made of (see `heap`). Order numbers begin anew before they reach the last one."""
+
 NEVER = (1 << 63) - 1
+"""The time of a row of `heap` that has no event."""
 
 # control: one row.
 HEAP_SIZE, NEXT_ORDER, FREE_PACKETS, ENDED, TAPPED, WANTS_DRAWS, FREE_BLOCK, FREE_BLOCKS = range(8)
@@ -290,7 +293,8 @@ class Memory:
             self._number_anew()
         elif self.control[FREE_BLOCKS] < self.layout.most_packets:
             taken = self._rows["blocks"]
-            self._rows["blocks"] += self._rows["packets"]
+            # Three packets fill one.
+            self._rows["blocks"] += self._rows["packets"] // 4
             self._allocate(self._tables)
             self._free_blocks(taken)
         else:
