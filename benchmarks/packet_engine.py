@@ -31,9 +31,9 @@ from tieline.network.packet import PacketEngine  # noqa: E402
 FRAMES, RATE_HZ, REPETITIONS = 90, 60, 7
 HOPS_PER_S, TIMES_NS3 = 4.0, 40
 ROOFLINE = """a packet-hop at a plain port reads and writes five lines of 64 bytes (event, packet, \
-plan, two of the port) and a line of the queue's ring, and sifts one event of 24 bytes through a \
-binary heap of up to 496 events, nine levels of two; all of it (packets, plans, ports and events, \
-about 150 kB) fits the second-level cache, so instructions bound it, not memory"""
+route, plan, port), a sixth where it waits, and sifts one event of 16 bytes through a heap of up \
+to 496 events, five levels of four; all of it (packets, plans, ports and events, about 100 kB) \
+fits the second-level cache, so instructions bound it, not memory"""
 
 
 def measured(engine: Engine, frames_at_a_time: int) -> dict[str, Any]:

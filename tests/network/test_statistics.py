@@ -124,14 +124,32 @@ def test_packets_are_counted_where_they_end():
     assert statistics.in_flight.tolist() == [0, 0, 0, 2]
 
 
+def counted(histograms: Histograms, flow: int, excess_ns: int) -> None:
+    """Count an excess, with more room if there is none for it."""
+    own = histograms
+    while not count(flow, excess_ns, own.block_of, own.counts, own.carries, own.used):
+        own.grow()
+
+
 def test_the_nearest_rank_of_few_counts():
     """Otherwise the percentile of a short run would lie between packets, or outside them."""
     few = Histograms(2)
     for excess_ns in (3 << 10, 10 << 10, 10 << 10, 1 << 30):
-        while not count(1, excess_ns, few.block_of, few.counts, few.used):
-            few.grow()
+        counted(few, 1, excess_ns)
     for share, excess_ns in ((0.25, 3 << 10), (0.26, 10 << 10), (0.75, 10 << 10), (1.0, 1 << 30)):
         assert few.percentiles_ns(share)[1] == middle_ns(bin_of(excess_ns))
+
+
+def test_the_nearest_rank_of_more_than_a_bin_can_count():
+    """Otherwise the percentiles of runs beyond 18 minutes would be those of their last packets."""
+    many = Histograms(2)
+    for excess_ns, packets in ((3 << 10, 70_000), (10 << 10, 69_999), (1 << 30, 1)):
+        for _ in range(packets):
+            counted(many, 1, excess_ns)
+        counted(many, 0, excess_ns)
+    for share, excess_ns in ((0.5, 3 << 10), (0.50001, 10 << 10), (1.0, 1 << 30)):
+        assert many.percentiles_ns(share)[1] == middle_ns(bin_of(excess_ns))
+    assert many.percentiles_ns(0.5)[0] == middle_ns(bin_of(10 << 10))
 
 
 @pytest.mark.parametrize("is_compiled", [True, False])
@@ -139,8 +157,8 @@ def test_percentiles_are_the_same_with_and_without_the_compiler(is_compiled: boo
     """A run without the compiler is what tells an error of the compiler from one of ours."""
     histograms = Histograms(1)
     for excess_us in (5, 5, 5, 900, 900, 70_000):
-        count(0, 1_000 * excess_us, histograms.block_of, histograms.counts, histograms.used)
+        counted(histograms, 0, 1_000 * excess_us)
     rank = _rank if is_compiled else getattr(_rank, "py_func", _rank)
     bins = np.zeros(1, np.int64)
-    rank(0.5, histograms.block_of, histograms.counts, bins)
+    rank(0.5, histograms.block_of, histograms.counts, histograms.carries, bins)
     assert middle_ns(bins) == pytest.approx(5_000, abs=1_024)

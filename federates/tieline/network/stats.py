@@ -118,6 +118,7 @@ class FlowStatistics:
             self._smoothed_ns,
             self._histograms.block_of,
             self._histograms.counts,
+            self._histograms.carries,
             self._histograms.used,
             self.delay_counts,
         )
@@ -170,14 +171,15 @@ def _add_delays(
     delays: NDArray[np.int64],
     smoothed_ns: NDArray[np.float64],
     block_of: NDArray[np.int32],
-    bins: NDArray[np.uint32],
+    bins: NDArray[np.uint16],
+    carries: NDArray[np.uint32],
     used: NDArray[np.int64],
     counts: NDArray[np.int64],
 ) -> int:
     for place in range(start, len(flows)):
         flow = flows[place]
         delay_ns = delays_ns[place]
-        if not count(flow, delay_ns - least_ns[flow], block_of, bins, used):
+        if not count(flow, delay_ns - least_ns[flow], block_of, bins, carries, used):
             return place
         counts[min(delay_ns // DELAY_BIN_NS, DELAY_BINS)] += 1
         if delays[flow, _COUNT] == 0:

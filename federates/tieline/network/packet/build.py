@@ -15,10 +15,12 @@ from tieline.network.packet.memory import (
     COLUMNS,
     CONNECTION_COLUMNS,
     END_CLASSES,
+    END_WAIT,
     EVENT_STREAM,
     FIRST_CLASS,
     FIRST_COME,
     FIRST_DRAW,
+    FIRST_WAIT,
     FORK,
     GAP_STREAM,
     HAS_BYTES,
@@ -29,6 +31,7 @@ from tieline.network.packet.memory import (
     HAS_TAP,
     HOP_PORT,
     JITTER_STREAM,
+    LINE,
     LOSS_LEFT,
     LOSS_STREAM,
     LOSS_UNIT,
@@ -45,7 +48,6 @@ from tieline.network.packet.memory import (
     RATE,
     RED,
     REPLY,
-    RING,
     ROUND_ROBIN,
     SERVICE_ORDER,
     SIZE_STREAM,
@@ -82,6 +84,7 @@ def laid_out(spec: NetworkSpec, supplies: Supplies) -> tuple[Memory, Changes, Ro
     connections, received = _connections(routes)
     tables = {
         "ports": ports.table,
+        "details": ports.details,
         "classes": _table("classes", ports.classes),
         "red": _table("red", ports.red),
         "hops": _hops(routes),
@@ -94,11 +97,11 @@ def laid_out(spec: NetworkSpec, supplies: Supplies) -> tuple[Memory, Changes, Ro
         "cross": _cross(spec, supplies, routes),
         "connections": connections,
         "received": received,
-        "ring": np.zeros((ports.ring, COLUMNS["ring"]), dtype=np.int64),
+        "blocks": np.zeros((ports.blocks, COLUMNS["blocks"]), dtype=np.int64),
     }
     changes = Changes(spec, supplies, routes)
     tables["streams"] = supplies.first_draws()
-    _look_ahead(tables["ports"], tables["streams"])
+    _look_ahead(tables["details"], tables["streams"])
     most = _most_packets(spec, routes)
     if most > CHUNK:
         raise InputError(f"the packet engine makes at most {CHUNK} packets at once ({most} asked)")
@@ -126,52 +129,52 @@ def _most_packets(spec: NetworkSpec, routes: Routes) -> int:
 
 
 class _Ports:
-    """The table of ports, with the rows of classes and of early detection that they need."""
+    """The tables of ports, with the rows of classes and of early detection that they need."""
 
     def __init__(self, spec: NetworkSpec, supplies: Supplies) -> None:
         self.table = np.zeros((2 * len(spec.links), COLUMNS["ports"]), dtype=np.int64)
-        self.table[:, [LOSS_STREAM, EVENT_STREAM, JITTER_STREAM, RED, PEER]] = NONE
+        self.details = np.zeros((2 * len(spec.links), COLUMNS["details"]), dtype=np.int64)
+        self.details[:, [LOSS_STREAM, EVENT_STREAM, JITTER_STREAM, RED, PEER]] = NONE
         self.classes: list[tuple[int, ...]] = []
         self.red: list[tuple[int, ...]] = []
-        self.ring = 0
+        self.blocks = 0
         self._supplies = supplies
         for (origin, target), number in spec.ports.items():
             link = spec.links[number // 2]
-            row = self.table[number]
-            row[PROPAGATION], row[RATE], row[OVERHEAD] = (
-                link.propagation_ns,
-                link.rate_bps,
-                link.overhead_bytes,
-            )
+            row, details = self.table[number], self.details[number]
+            row[PROPAGATION] = link.propagation_ns
+            details[RATE], details[OVERHEAD] = link.rate_bps, link.overhead_bytes
             if link.is_half_duplex:
-                row[PEER] = number ^ 1
+                details[PEER] = number ^ 1
             if number // 2 in spec.taps:
                 row[SPECIAL] |= HAS_TAP
-            self._queue(row, link, f"{origin}->{target}")
-            self._losses(row, link.loss, f"{origin}->{target}")
+            self._queue(row, details, link, f"{origin}->{target}")
+            self._losses(row, details, link.loss, f"{origin}->{target}")
             if link.jitter is not None:
                 row[SPECIAL] |= HAS_JITTER
-                row[JITTER_STREAM] = supplies.jitter(f"jitter of {origin}->{target}", link.jitter)
+                own = supplies.jitter(f"jitter of {origin}->{target}", link.jitter)
+                details[JITTER_STREAM] = own
 
-    def _queue(self, row: Cells, link: Link, name: str) -> None:
+    def _queue(self, row: Cells, details: Cells, link: Link, name: str) -> None:
         lines = link.queue.lines
         if len(lines) > 1 or link.is_half_duplex:
             row[SPECIAL] |= HAS_SERVER
-            row[SERVICE_ORDER] = _ORDERS[link.queue.order]
-            row[FIRST_CLASS] = row[TURN] = len(self.classes)
+            details[SERVICE_ORDER] = _ORDERS[link.queue.order]
+            details[FIRST_CLASS] = details[TURN] = len(self.classes)
             self.classes += [
                 (line.packets, line.bytes, line.quantum_bytes, 0, 0, 0, 0, 0) for line in lines
             ]
-            row[END_CLASSES] = len(self.classes)
+            details[END_CLASSES] = len(self.classes)
             return
-        row[QUEUE], row[RING] = lines[0].packets, self.ring
-        self.ring += lines[0].packets
+        row[QUEUE] = lines[0].packets
+        row[FIRST_WAIT] = row[END_WAIT] = LINE * self.blocks
+        self.blocks += 1
         if lines[0].bytes < NO_LIMIT:
             row[SPECIAL] |= HAS_BYTES
-            row[QUEUE_BYTES] = lines[0].bytes
+            details[QUEUE_BYTES] = lines[0].bytes
         if link.queue.early_detection is not None:
             row[SPECIAL] |= HAS_RED
-            row[RED] = len(self.red)
+            details[RED] = len(self.red)
             draws = self._supplies.open(
                 uniforms(self._supplies.seed, f"early drops of {name}"),
                 f"early drops of {name}",
@@ -179,13 +182,13 @@ class _Ports:
             )
             self.red.append(_red(link.queue.early_detection, draws))
 
-    def _losses(self, row: Cells, loss: Loss | None, name: str) -> None:
+    def _losses(self, row: Cells, details: Cells, loss: Loss | None, name: str) -> None:
         if loss is None:
             return
         row[SPECIAL] |= HAS_LOSS
-        row[LOSS_UNIT] = PER_BIT if loss.counts == "bits" else PER_PACKET
+        details[LOSS_UNIT] = PER_BIT if loss.counts == "bits" else PER_PACKET
         generator = stream(self._supplies.seed, f"loss of {name}")
-        row[LOSS_STREAM] = self._supplies.open(loss.gaps(generator), f"loss of {name}", LOSSES)
+        details[LOSS_STREAM] = self._supplies.open(loss.gaps(generator), f"loss of {name}", LOSSES)
 
 
 def _red(early: EarlyDetection, draws: int) -> tuple[int, ...]:
@@ -193,11 +196,11 @@ def _red(early: EarlyDetection, draws: int) -> tuple[int, ...]:
     return low, high, round(early.probability * CERTAIN), early.weight_shift, draws, 0, -1
 
 
-def _look_ahead(ports: Cells, streams: Cells) -> None:
+def _look_ahead(details: Cells, streams: Cells) -> None:
     """Take the first gap of every stream of losses."""
-    lossy = np.flatnonzero(ports[:, LOSS_STREAM] != NONE)
-    numbers = ports[lossy, LOSS_STREAM]
-    ports[lossy, LOSS_LEFT] = streams[numbers, FIRST_DRAW]
+    lossy = np.flatnonzero(details[:, LOSS_STREAM] != NONE)
+    numbers = details[lossy, LOSS_STREAM]
+    details[lossy, LOSS_LEFT] = streams[numbers, FIRST_DRAW]
     streams[numbers, USED] = 1
 
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from tieline.network.engine import LINK_DOWN
 from tieline.network.losses import Bernoulli
-from tieline.network.packet.events import ARRIVAL, DEPARTURE, KINDS
+from tieline.network.packet.counters import settle
+from tieline.network.packet.kinds import ARRIVAL, DEPARTURE, KINDS, items_of
 from tieline.network.packet.memory import (
     BUSY,
     BYTES,
@@ -32,15 +33,11 @@ from tieline.network.packet.memory import (
     HOP_SERVICE,
     IS_DOWN,
     IS_SERVING,
-    ITEM,
     LOSS_STREAM,
     NONE,
-    ORDER,
     PACKETS,
-    QUEUE,
+    RANK,
     RATE,
-    RING,
-    RING_HEAD,
     SEQUENCE,
     SPECIAL,
     TIME,
@@ -51,8 +48,10 @@ from tieline.network.packet.memory import (
     Memory,
 )
 from tieline.network.packet.packets import dropped
+from tieline.network.packet.ports import waiting_now
 from tieline.network.packet.routes import Routes
 from tieline.network.packet.supplies import LOSSES, Supplies
+from tieline.network.packet.ways import PORT_COLUMNS
 from tieline.network.spec import (
     LinkCut,
     LinkRepair,
@@ -119,14 +118,15 @@ class Changes:
         return starts
 
     def _set_losses(self, change: LossChange, port: int, memory: Memory) -> None:
-        row, streams = memory.table("ports")[port], memory.table("streams")
+        row, details = memory.table("ports")[port], memory.table("details")[port]
+        streams = memory.table("streams")
         number = self._streams.get((self._done, port), NONE)
-        row[EVENT_STREAM] = number
+        details[EVENT_STREAM] = number
         if number != NONE:
             row[SPECIAL] |= HAS_LOSS
-            row[EVENT_LEFT] = streams[number, FIRST_DRAW + streams[number, USED]]
+            details[EVENT_LEFT] = streams[number, FIRST_DRAW + streams[number, USED]]
             streams[number, USED] += 1
-        elif row[LOSS_STREAM] == NONE:
+        elif details[LOSS_STREAM] == NONE:
             row[SPECIAL] &= ~HAS_LOSS
 
 
@@ -147,7 +147,7 @@ def _open_losses(
 
 def _cut(now: int, port: int, memory: Memory) -> None:
     """Take a port down: all that is on it, or waits for it, is dropped at once."""
-    row = memory.table("ports")[port]
+    row, details = memory.table("ports")[port], memory.table("details")[port]
     inside = memory.inside()
     packets = memory.table("packets")
     hops = packets[inside, HOP]
@@ -158,17 +158,18 @@ def _cut(now: int, port: int, memory: Memory) -> None:
     memory.free(lost)
     for slot in lost:
         _drop(now, int(slot), memory)
-    row[DOWN_DROPS] += len(lost)
+    details[DOWN_DROPS] += len(lost)
     # What has not been transmitted has not been put on the link either.
-    places = _waiting_places(row)
-    places = places[memory.table("ring")[places, 0] >= now]
-    row[PACKETS] -= len(places)
-    row[BYTES] -= memory.table("ring")[places, 1].sum()
-    row[BUSY] -= max(0, row[FREE_AT] - now)
+    places = _yet_to_start(now, port, memory)
+    details[PACKETS] -= len(places)
+    details[BYTES] -= memory.waits[places + 1].sum()
+    details[BUSY] -= max(0, row[FREE_AT] - now)
     row[FREE_AT] = min(row[FREE_AT], now)
-    row[[WAITING, WAITING_BYTES, RING_HEAD, IS_SERVING]] = 0
+    waiting_now(NOT_YET, memory.layout.ports + PORT_COLUMNS * port, memory.cells, memory.layout)
+    row[WAITING] = 0
+    details[[WAITING_BYTES, IS_SERVING]] = 0
     if row[SPECIAL] & HAS_SERVER:
-        classes = memory.table("classes")[row[FIRST_CLASS] : row[END_CLASSES]]
+        classes = memory.table("classes")[details[FIRST_CLASS] : details[END_CLASSES]]
         classes[:, [COUNT, HELD_BYTES, DEFICIT]] = 0
     row[SPECIAL] |= IS_DOWN
 
@@ -176,7 +177,7 @@ def _cut(now: int, port: int, memory: Memory) -> None:
 def _forget_events(memory: Memory, slots: Cells, port: int) -> None:
     """Remove the events of packets, and the end of a port's transmission."""
     events = memory.events()
-    number, kind = events[:, ITEM] // KINDS, events[:, ITEM] % KINDS
+    number, kind = np.divmod(items_of(events), KINDS)
     is_lost = (kind == ARRIVAL) & np.isin(number, slots)
     memory.put_events(events[~is_lost & ~((kind == DEPARTURE) & (number == port))])
 
@@ -192,53 +193,52 @@ def _set_rate(change: RateChange, port: int, memory: Memory) -> Cells:
 
     Returns when the packets start that wait at a plain port.
     """
-    row, plans = memory.table("ports")[port], memory.table("plans")
+    details, plans = memory.table("details")[port], memory.table("plans")
+    # What has been carried took the old rate.
+    settle(memory.cells, memory.layout)
     own = (plans[:, HOP_PORT] == port) & (plans[:, HOP_SERVICE] != NONE)
     before = plans[:, HOP_SERVICE].copy()
-    old_rate, row[RATE] = int(row[RATE]), change.rate_bps
+    old_rate, details[RATE] = int(details[RATE]), change.rate_bps
     plans[own, HOP_SERVICE] = _service_ns(plans[own, HOP_BYTES], change.rate_bps)
-    if row[SPECIAL] & HAS_SERVER:
-        return NOTHING
     return _set_starts(change.at_ns, port, before, old_rate, memory)
 
 
 def _set_starts(now: int, port: int, before: Cells, old_rate: int, memory: Memory) -> Cells:
     """Move the starts of what waits at a plain port, and the events that depend on them."""
     row, plans = memory.table("ports")[port], memory.table("plans")
-    places = _waiting_places(row)
-    ring = memory.table("ring")
-    places = places[ring[places, 0] >= now]
+    details = memory.table("details")[port]
+    waits, places = memory.waits, _yet_to_start(now, port, memory)
     if len(places) == 0:
         return NOTHING
     events = memory.events().copy()
-    slots = events[:, ITEM] // KINDS
-    is_arrival = events[:, ITEM] % KINDS == ARRIVAL
+    slots, kinds = np.divmod(items_of(events), KINDS)
+    is_arrival = kinds == ARRIVAL
     packets = memory.table("packets")
     on_port = np.zeros(len(events), dtype=bool)
     on_port[is_arrival] = memory.plans_of(packets[slots[is_arrival], HOP])[:, HOP_PORT] == port
     # Events are ordered as packets came, and the last to come are those that wait.
     own = np.flatnonzero(on_port)
-    waiting = own[np.argsort(events[own, ORDER])][-len(places) :]
-    old_starts, sizes = ring[places, 0].copy(), ring[places, 1]
+    waiting = own[np.argsort(events[own, RANK])][-len(places) :]
+    old_starts, sizes = waits[places].copy(), waits[places + 1]
     own_plans = memory.plan_numbers_of(packets[slots[waiting], HOP])
     is_sized = plans[own_plans, HOP_SERVICE] == NONE
     old = np.where(is_sized, _service_ns(sizes, old_rate), before[own_plans])
-    new = _service_ns(sizes, int(row[RATE]))
+    new = _service_ns(sizes, int(details[RATE]))
     starts = old_starts[0] + np.cumsum(new) - new
-    ring[places, 0] = starts
+    waits[places] = starts
     events[waiting, TIME] += starts + new - old_starts - old
     memory.put_events(events)
     row[FREE_AT] = starts[-1] + new[-1]
-    row[BUSY] += int((new - old).sum())
+    details[BUSY] += int((new - old).sum())
     return starts
 
 
-def _waiting_places(row: Cells) -> Cells:
-    """Return the rows of `ring` of a plain port, in order; those of a port with a server: none."""
-    if row[SPECIAL] & HAS_SERVER:
+def _yet_to_start(now: int, port: int, memory: Memory) -> Cells:
+    """Return the places in `waits` of what waits at a plain port; at one with a server: none."""
+    if memory.table("ports")[port, SPECIAL] & HAS_SERVER:
         return NOTHING
-    places: Cells = row[RING] + (row[RING_HEAD] + np.arange(row[WAITING])) % max(row[QUEUE], 1)
-    return places
+    places = memory.waiting_at(port)
+    return places[memory.waits[places] >= now]
 
 
 def _service_ns(sizes: Cells, rate_bps: int) -> Cells:

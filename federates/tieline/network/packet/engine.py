@@ -17,9 +17,9 @@ from tieline.network.engine import (
 )
 from tieline.network.packet import kernel, tcp
 from tieline.network.packet.build import Supplies, laid_out
-from tieline.network.packet.counters import frames_announced, read_counters
+from tieline.network.packet.counters import frames_announced, read_counters, settle
 from tieline.network.packet.endings import Endings
-from tieline.network.packet.events import CROSS, FRAME, KINDS
+from tieline.network.packet.kinds import CROSS, FRAME, KINDS
 from tieline.network.packet.memory import (
     ARRIVED,
     BUSY,
@@ -37,8 +37,11 @@ from tieline.network.packet.memory import (
     GAP_STREAM,
     HEAP_SIZE,
     HOP,
+    ITEM_BITS,
+    LATER,
     LOSS_DROPS,
     MAX_QUEUE,
+    NEXT_ORDER,
     NONE,
     PACKETS,
     QUEUE_DROPS,
@@ -96,7 +99,7 @@ class PacketEngine:
         """
         check_not_late(measured_ns + self.lookahead_ns, self._now_ns)
         items = KINDS * (sequence * len(self._spec.sources) + sources) + FRAME
-        self._announce(self._pmus.ready_ns(measured_ns, sources), items, kernel.FRAME_ORDER)
+        self._announce(self._pmus.ready_ns(measured_ns, sources), LATER + items)
         self._sent += int(self._flows_of[sources].sum())
 
     def run_until(self, until_ns: int) -> Outcome:
@@ -135,7 +138,8 @@ class PacketEngine:
 
     def links(self) -> list[LinkUse]:
         """Return what each link carried up to the last `run_until`, direction by direction."""
-        rows = self._memory.table("ports").tolist()
+        settle(self._memory.cells, self._memory.layout)
+        ports, rows = (self._memory.table(name).tolist() for name in ("ports", "details"))
         before = self._max_queue.tolist()
         return [
             LinkUse(
@@ -146,8 +150,8 @@ class PacketEngine:
                 bytes=rows[port][BYTES],
                 dropped_queue=rows[port][QUEUE_DROPS],
                 dropped_loss=rows[port][LOSS_DROPS],
-                busy_ns=rows[port][BUSY] - max(0, rows[port][FREE_AT] - max(0, self._now_ns)),
-                max_queue=max(before[port], rows[port][MAX_QUEUE]),
+                busy_ns=rows[port][BUSY] - max(0, ports[port][FREE_AT] - max(0, self._now_ns)),
+                max_queue=max(before[port], ports[port][MAX_QUEUE]),
                 dropped_down=rows[port][DOWN_DROPS],
             )
             for (origin, target), port in self._spec.ports.items()
@@ -193,8 +197,9 @@ class PacketEngine:
         streams = self._memory.table("streams")
         own = self._memory.table("cross")[:, GAP_STREAM]
         own = own[own != NONE]
-        items = KINDS * np.arange(len(own), dtype=np.int64) + CROSS
-        self._announce(streams[own, FIRST_DRAW], items, base_order=0)
+        orders = np.arange(len(own), dtype=np.int64)
+        self._memory.control[NEXT_ORDER] = len(own)
+        self._announce(streams[own, FIRST_DRAW], (orders << ITEM_BITS) + KINDS * orders + CROSS)
         streams[own, USED] = 1
         # Compiles, where that is still to be done, before the federation waits for an answer.
         self._run(-1)
@@ -202,21 +207,18 @@ class PacketEngine:
     def _change(self) -> None:
         """Do the next change of the network."""
         at_ns = self._changes.next_ns
-        while self._inside() > self._memory.layout.capacity:
-            self._memory.grow()
+        self._memory.hold_records(self._inside())
         starts = self._changes.apply(self._memory)
         self._collect()
         self._taps.move(starts, at_ns)
 
-    def _announce(
-        self, times_ns: NDArray[np.int64], items: NDArray[np.int64], base_order: int
-    ) -> None:
+    def _announce(self, times_ns: NDArray[np.int64], ranks: NDArray[np.int64]) -> None:
         while (
-            self._memory.control[HEAP_SIZE] + 2 * self._memory.layout.most_packets + len(items)
+            self._memory.control[HEAP_SIZE] + 2 * self._memory.layout.most_packets + len(ranks)
             > self._memory.layout.capacity
         ):
             self._memory.grow()
-        kernel.announce(times_ns, items, base_order, self._memory.cells, self._memory.layout)
+        kernel.announce(times_ns, ranks, self._memory.cells, self._memory.layout)
 
     def _inside(self) -> int:
         """Return the packets inside, each member of a tree counted."""
@@ -245,7 +247,7 @@ class PacketEngine:
             if stop == kernel.NEEDS_DRAWS:
                 self._refill()
             elif not kernel.events_with_room(self._memory.cells, self._memory.layout):
-                self._memory.grow()
+                self._memory.make_room()
 
     def _run(self, until_ns: int) -> int:
         """Run the kernel as far as it comes, and take over its records."""

@@ -8,7 +8,9 @@ and however its caller cuts the time into pieces.
 from tieline.compiled import compiled_from_zero, inlined
 from tieline.network.engine import DELIVERED, LOSS
 from tieline.network.packet import tcp
-from tieline.network.packet.events import (
+from tieline.network.packet.events import pop_event, push_event, replace_event, take
+from tieline.network.packet.heap import push
+from tieline.network.packet.kinds import (
     ARRIVAL,
     CROSS,
     DEPARTURE,
@@ -18,12 +20,7 @@ from tieline.network.packet.events import (
     REPLY,
     TIMER,
     item_of,
-    next_order,
-    pop_event,
-    push_event,
-    take,
 )
-from tieline.network.packet.heap import replace_first
 from tieline.network.packet.memory import (
     ARRIVED,
     COLUMNS,
@@ -32,18 +29,21 @@ from tieline.network.packet.memory import (
     ENDED,
     FIRST_FLOW,
     FLOW,
+    FREE_BLOCKS,
     FREE_PACKETS,
     GAP_STREAM,
     HEAP_SIZE,
     HOP,
     HOP_PORT,
     IP_BYTES,
-    ITEM,
     LOSS_DROPS,
     LOST,
+    MOST_ORDERS,
+    NEXT_ORDER,
     NO_PORT,
     NONE,
     ONWARD,
+    RANK,
     SENT,
     SEQUENCE,
     SIZE_STREAM,
@@ -65,13 +65,9 @@ from tieline.network.packet.packets import (
     record_end,
 )
 from tieline.network.packet.ports import WAITS, depart, transmit
-from tieline.network.packet.ways import PORT_COLUMNS, plan_of, port_at
+from tieline.network.packet.ways import DETAILS, plan_of, port_at
 
 DONE, NEEDS_ROOM, NEEDS_DRAWS = 0, 1, 2
-
-FRAME_ORDER = 1 << 62
-"""Added to a frame's order: it enters after every other event of its instant, whenever it was
-announced, so that sending it earlier or later in wall time changes nothing."""
 
 _FLOW, _SOURCE, _CROSS, _PACKET = (
     COLUMNS[name] for name in ("flows", "sources", "cross", "packets")
@@ -109,7 +105,7 @@ def step(cells: Cells, at: Layout) -> None:
 @inlined
 def _process_first(cells: Cells, at: Layout) -> None:
     now = cells[at.heap + TIME]
-    item = cells[at.heap + ITEM]
+    item = item_of(cells[at.heap + RANK])
     kind, number = item & (KINDS - 1), item >> KIND_BITS
     if kind == ARRIVAL:
         _arrive(now, number, cells, at)
@@ -128,11 +124,12 @@ def _process_first(cells: Cells, at: Layout) -> None:
 
 
 @compiled_from_zero
-def announce(times_ns: Cells, items: Cells, base_order: int, cells: Cells, at: Layout) -> None:
+def announce(times_ns: Cells, ranks: Cells, cells: Cells, at: Layout) -> None:
     """Add frames, or the first packets of cross flows, to the events; the heap must have room."""
     for place in range(len(times_ns)):
-        order = base_order + next_order(cells, at)
-        push_event(times_ns[place], order, items[place], cells, at)
+        size = cells[at.control + HEAP_SIZE]
+        push(size, times_ns[place], ranks[place], cells, at)
+        cells[at.control + HEAP_SIZE] = size + 1
 
 
 @inlined
@@ -140,9 +137,11 @@ def events_with_room(cells: Cells, at: Layout) -> int:
     """Return how many events can be processed for certain, whatever they are."""
     free = min(
         cells[at.control + FREE_PACKETS],
+        cells[at.control + FREE_BLOCKS],
         (at.capacity - cells[at.control + HEAP_SIZE]) >> 1,
-        at.capacity - cells[at.control + ENDED],
-        at.capacity - cells[at.control + TAPPED],
+        (MOST_ORDERS - cells[at.control + NEXT_ORDER]) >> 1,
+        at.records - cells[at.control + ENDED],
+        at.records - cells[at.control + TAPPED],
     )
     return free // at.most_packets
 
@@ -159,8 +158,7 @@ def _arrive(now: int, slot: int, cells: Cells, at: Layout) -> None:
     elif port >= 0:
         arrival_ns = transmit(now, slot, hop, way, cells, at)
         if arrival_ns >= 0:
-            size = cells[at.control + HEAP_SIZE]
-            replace_first(cells, at.heap, size, arrival_ns, next_order(cells, at), 8 * slot)
+            replace_event(arrival_ns, ARRIVAL, slot, cells, at)
         elif arrival_ns == WAITS:
             pop_event(cells, at)
         else:
@@ -184,7 +182,7 @@ def _lose(now: int, slot: int, cells: Cells, at: Layout) -> None:
     packet = at.packets + _PACKET * slot
     hop = cells[packet + HOP]
     port = cells[plan_of(hop, cells, at) + HOP_PORT]
-    cells[at.ports + PORT_COLUMNS * port + LOSS_DROPS] += 1
+    cells[at.details + DETAILS * port + LOSS_DROPS] += 1
     _leave(slot, cells, at)
     dropped(now, cells[packet + FLOW], cells[packet + SEQUENCE], hop, LOSS, cells, at)
 
@@ -206,8 +204,7 @@ def _reach_target(now: int, flow: int, sequence: int, cells: Cells, at: Layout) 
     if connection != NONE:
         tcp.on_packet(now, flow, connection, sequence, cells, at)
     elif cells[row + REPLY_FLOW] != NONE:
-        item = item_of(REPLY, cells[row + REPLY_FLOW])
-        push_event(now + cells[row + THINK], next_order(cells, at), item, cells, at)
+        push_event(now + cells[row + THINK], REPLY, cells[row + REPLY_FLOW], cells, at)
 
 
 @inlined
@@ -232,9 +229,7 @@ def _send_cross(now: int, number: int, cells: Cells, at: Layout) -> None:
         )
     next_ns = now + take(cells[row + GAP_STREAM], cells, at)
     # The packet's own event is later in the heap's order, so this one still stands first.
-    events = cells[at.control + HEAP_SIZE]
-    item = item_of(CROSS, number)
-    replace_first(cells, at.heap, events, next_ns, next_order(cells, at), item)
+    replace_event(next_ns, CROSS, number, cells, at)
 
 
 @compiled_from_zero

@@ -38,8 +38,6 @@ from tieline.network.packet.memory import (
     RED,
     RED_AVERAGE,
     RED_STREAM,
-    RING,
-    RING_HEAD,
     SPECIAL,
     USED,
     WAITING,
@@ -58,7 +56,7 @@ class Port:
     """A port as it is at an instant.
 
     Attributes:
-        row: its row of the kernel's table.
+        row, details: its rows of the kernel's tables.
         packets, bytes: what waits there.
         is_busy: whether a packet is in transmission.
         taken: by stream, how many numbers have been used.
@@ -67,6 +65,7 @@ class Port:
     """
 
     row: list[int]
+    details: list[int]
     packets: int
     bytes: int
     is_busy: bool
@@ -78,18 +77,19 @@ class Port:
 
 def port_now(number: int, now: int, memory: Memory, supplies: Supplies) -> Port:
     """Return a port as it is before the event of an instant."""
-    row = [int(value) for value in memory.table("ports")[number]]
+    row, details = (memory.table(name)[number].tolist() for name in ("ports", "details"))
     streams = memory.table("streams")
     red = early = None
     if row[SPECIAL] & HAS_RED:
-        red = memory.table("red")[row[RED]]
+        red = memory.table("red")[details[RED]]
         own = int(red[RED_STREAM])
         early = float(streams[own, FIRST_DRAW + streams[own, USED]]) / CERTAIN
-    used = [row[column] for column in (LOSS_STREAM, EVENT_STREAM, JITTER_STREAM)]
+    used = [details[column] for column in (LOSS_STREAM, EVENT_STREAM, JITTER_STREAM)]
     used += [] if red is None else [int(red[RED_STREAM])]
-    packets, size, is_busy = _queue(row, now, memory)
+    packets, size, is_busy = _queue(number, now, memory)
     return Port(
         row,
+        details,
         packets,
         size,
         is_busy,
@@ -100,16 +100,16 @@ def port_now(number: int, now: int, memory: Memory, supplies: Supplies) -> Port:
     )
 
 
-def _queue(row: list[int], now: int, memory: Memory) -> tuple[int, int, bool]:
+def _queue(port: int, now: int, memory: Memory) -> tuple[int, int, bool]:
     """Return packets and bytes that wait at a port, and whether its link is in use."""
+    row, details = memory.table("ports")[port], memory.table("details")
     if row[SPECIAL] & HAS_SERVER:
-        peer = row[PEER]
-        is_busy = row[IS_SERVING] or (peer != NONE and memory.table("ports")[peer, IS_SERVING] != 0)
-        return row[WAITING], row[WAITING_BYTES], bool(is_busy)
-    ring = memory.table("ring")
-    places = [row[RING] + (row[RING_HEAD] + i) % row[QUEUE] for i in range(row[WAITING])]
-    sizes = [int(ring[place, 1]) for place in places if ring[place, 0] > now]
-    return len(sizes), sum(sizes), row[FREE_AT] > now
+        own, peer = details[port], details[port, PEER]
+        is_busy = own[IS_SERVING] or (peer != NONE and details[peer, IS_SERVING] != 0)
+        return int(row[WAITING]), int(own[WAITING_BYTES]), bool(is_busy)
+    places = memory.waiting_at(port)
+    places = places[memory.waits[places] > now]
+    return len(places), int(memory.waits[places + 1].sum()), bool(row[FREE_AT] > now)
 
 
 def hop_of(now: int, row: int, ip_bytes: int, port: Port, memory: Memory, spec: NetworkSpec) -> Hop:
@@ -118,7 +118,7 @@ def hop_of(now: int, row: int, ip_bytes: int, port: Port, memory: Memory, spec: 
     origin, target = ends_of(int(plan[HOP_PORT]), spec)
     size = int(plan[HOP_BYTES])
     if plan[HOP_SERVICE] == NONE:
-        size = ip_bytes + port.row[OVERHEAD]
+        size = ip_bytes + port.details[OVERHEAD]
     return Hop(
         origin,
         target,
@@ -141,11 +141,11 @@ def note_sent(
     hop: Hop, starts_ns: int, reaches_ns: int, is_lost: bool, port: Port, supplies: Supplies
 ) -> None:
     """Complete the record of a packet that goes on its link, given the port before that."""
-    row = port.row
+    details = port.details
     hop.starts_ns, hop.reaches_ns = starts_ns, reaches_ns
-    hop.service_ns = serialisation_ns(hop.size_bytes, row[RATE])
-    if row[SPECIAL] & HAS_JITTER:
-        stream = row[JITTER_STREAM]
+    hop.service_ns = serialisation_ns(hop.size_bytes, details[RATE])
+    if port.row[SPECIAL] & HAS_JITTER:
+        stream = details[JITTER_STREAM]
         hop.jitter_ns = reaches_ns - starts_ns - hop.service_ns - hop.propagation_ns
         number = port.taken[stream] + 1
         hop.jitter = Draw(supplies.names[stream], number, float(hop.jitter_ns))
@@ -155,11 +155,12 @@ def note_sent(
 
 def _loss(hop: Hop, port: Port, supplies: Supplies) -> Draw:
     """Return the gap between losses that ended within the packet."""
-    row = port.row
-    amount = _BITS_PER_BYTE * hop.size_bytes if row[LOSS_UNIT] == PER_BIT else 1
-    stream = row[EVENT_STREAM]
-    if row[SPECIAL] & HAS_LOSS and row[LOSS_STREAM] != NONE and row[LOSS_LEFT] <= amount:
-        stream = row[LOSS_STREAM]
+    details = port.details
+    amount = _BITS_PER_BYTE * hop.size_bytes if details[LOSS_UNIT] == PER_BIT else 1
+    stream = details[EVENT_STREAM]
+    has_own = port.row[SPECIAL] & HAS_LOSS and details[LOSS_STREAM] != NONE
+    if has_own and details[LOSS_LEFT] <= amount:
+        stream = details[LOSS_STREAM]
     return Draw(supplies.names[stream], port.taken[stream])
 
 
@@ -183,7 +184,7 @@ def note_refused(hop: Hop, row: int, port: Port, memory: Memory, supplies: Suppl
 def _why_full(hop: Hop, row: int, port: Port, memory: Memory) -> str | None:
     """Return in words why a queue has no room for a packet; None if it has."""
     if port.row[SPECIAL] & HAS_SERVER:
-        place = port.row[FIRST_CLASS] + int(memory.plans_of(row)[HOP_CLASS])
+        place = port.details[FIRST_CLASS] + int(memory.plans_of(row)[HOP_CLASS])
         line = memory.table("classes")[place]
         if line[COUNT] >= line[CLASS_PACKETS]:
             return f"its class held {line[COUNT]} packets, the most it takes"
@@ -192,7 +193,7 @@ def _why_full(hop: Hop, row: int, port: Port, memory: Memory) -> str | None:
         return None
     if port.packets >= port.row[QUEUE]:
         return f"the queue held {port.packets} packets, the most it takes"
-    most = port.row[QUEUE_BYTES]
+    most = port.details[QUEUE_BYTES]
     if port.row[SPECIAL] & HAS_BYTES and port.bytes + hop.size_bytes > most:
         return f"the queue held {port.bytes} of at most {most} bytes"
     return None

@@ -2,7 +2,8 @@
 
 from tieline.compiled import compiled_from_zero, inlined
 from tieline.network.engine import DELIVERED, LINK_DOWN, QUEUE_FULL
-from tieline.network.packet.events import ARRIVAL, item_of, next_order, push_event, take
+from tieline.network.packet.events import push_event, take
+from tieline.network.packet.kinds import ARRIVAL
 from tieline.network.packet.memory import (
     ARRIVED,
     COLUMNS,
@@ -152,4 +153,4 @@ def _put_on_link(
         return
     cells[at.control + FREE_PACKETS] -= 1
     if arrival_ns != WAITS:
-        push_event(arrival_ns, next_order(cells, at), item_of(ARRIVAL, slot), cells, at)
+        push_event(arrival_ns, ARRIVAL, slot, cells, at)

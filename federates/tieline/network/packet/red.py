@@ -21,6 +21,7 @@ from tieline.network.packet.memory import (
     Cells,
     Layout,
 )
+from tieline.network.packet.ways import details_of
 
 ONE_PACKET = 1 << 20
 CERTAIN = 1 << 30
@@ -33,7 +34,7 @@ def is_dropped_early(
     now: int, waiting: int, service_ns: int, port: int, cells: Cells, at: Layout
 ) -> bool:
     """Return whether a packet that finds some waiting is dropped, and note that it came."""
-    row = at.red + _RED * cells[port + RED]
+    row = at.red + _RED * cells[details_of(port, at) + RED]
     average = cells[row + RED_AVERAGE]
     idle_ns = now - cells[port + FREE_AT]
     if idle_ns > 0:

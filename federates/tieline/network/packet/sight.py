@@ -1,6 +1,6 @@
 """Finds one packet in the kernel's memory."""
 
-from tieline.network.packet.events import ARRIVAL, KINDS
+from tieline.network.packet.kinds import ARRIVAL, KINDS, items_of
 from tieline.network.packet.memory import (
     END_FORKS,
     END_MEMBERS,
@@ -11,7 +11,6 @@ from tieline.network.packet.memory import (
     HOP,
     HOP_PORT,
     IP_BYTES,
-    ITEM,
     NO_PORT,
     SEQUENCE,
     TAP_FLOW,
@@ -84,4 +83,4 @@ class Sight:
     def reaches_ns(self, slot: int) -> int:
         """Return when the packet in a slot reaches the end of its link."""
         events = self._memory.events()
-        return int(events[events[:, ITEM] == KINDS * slot + ARRIVAL, TIME][0])
+        return int(events[items_of(events) == KINDS * slot + ARRIVAL, TIME][0])

@@ -12,7 +12,8 @@ Windows are kept in 1/1024 segments, times in nanoseconds.
 
 from tieline.compiled import compiled_from_zero, inlined
 from tieline.network.engine import DELIVERED, QUEUE_FULL
-from tieline.network.packet.events import TIMER, item_of, next_order, push_event
+from tieline.network.packet.events import push_event
+from tieline.network.packet.kinds import TIMER
 from tieline.network.packet.memory import (
     COLUMNS,
     CONNECTION_COLUMNS,
@@ -233,4 +234,4 @@ def _plan_timer(deadline: int, connection: int, cells: Cells, at: Layout) -> Non
     row = at.connections + CONNECTION_COLUMNS * connection
     if cells[row + TIMER_AT] == 0 or cells[row + TIMER_AT] > deadline:
         cells[row + TIMER_AT] = deadline
-        push_event(deadline, next_order(cells, at), item_of(TIMER, connection), cells, at)
+        push_event(deadline, TIMER, connection, cells, at)

@@ -15,7 +15,8 @@ from tieline.network.engine import DELIVERED, LINK_DOWN, Outcome
 from tieline.network.fate import Draw, Fate, Hop
 from tieline.network.packet import kernel, tcp
 from tieline.network.packet.engine import PacketEngine
-from tieline.network.packet.events import ARRIVAL, FRAME, KINDS, pop_event
+from tieline.network.packet.events import pop_event
+from tieline.network.packet.kinds import ARRIVAL, FRAME, KINDS, items_of
 from tieline.network.packet.looking import (
     Port,
     hop_of,
@@ -36,7 +37,6 @@ from tieline.network.packet.memory import (
     HAS_TAP,
     HEAP_SIZE,
     HOP_PORT,
-    ITEM,
     LOST,
     NONE,
     PROCESSING_STREAM,
@@ -164,12 +164,13 @@ class TracingEngine(PacketEngine):
         if any(copy.waits for copy in self._copies):
             return int(events[0, TIME])
         items = [KINDS * copy.slot + ARRIVAL for copy in self._copies] + [self._code]
-        times = events[np.isin(events[:, ITEM], items), TIME]
+        times = events[np.isin(items_of(events), items), TIME]
         return int(times.min()) if len(times) else 1 << 62
 
     def _step(self) -> bool:
         """Process the first event, see what it does to the packet; return whether it has ended."""
-        now, _, item = (int(value) for value in self._memory.events()[0])
+        first = self._memory.events()[:1]
+        now, item = int(first[0, TIME]), int(items_of(first)[0])
         self._event_ns = now
         stream = self._controller_stream()
         if stream != NONE:
@@ -322,7 +323,7 @@ class TracingEngine(PacketEngine):
         if reaches_ns == copy.hop.reaches_ns:
             return
         port = int(self._memory.plans_of(copy.row)[HOP_PORT])
-        rate_bps = int(self._memory.table("ports")[port, RATE])
+        rate_bps = int(self._memory.table("details")[port, RATE])
         hop = copy.hop
         hop.reaches_ns = reaches_ns
         hop.service_ns = serialisation_ns(hop.size_bytes, rate_bps)

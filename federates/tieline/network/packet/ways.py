@@ -17,7 +17,8 @@ from tieline.network.packet.memory import (
     Layout,
 )
 
-PORT_COLUMNS, _PLAN, _PACKET = (COLUMNS[name] for name in ("ports", "plans", "packets"))
+PORT_COLUMNS, DETAILS = COLUMNS["ports"], COLUMNS["details"]
+_PLAN, _PACKET = COLUMNS["plans"], COLUMNS["packets"]
 
 
 @inlined
@@ -38,6 +39,12 @@ def port_at(way: int) -> int:
     return (way & PORT_MASK) + FORK
 
 
+@inlined
+def details_of(port: int, at: Layout) -> int:
+    """Return where the details of a port begin, given where the port does."""
+    return at.details + DETAILS // PORT_COLUMNS * (port - at.ports)
+
+
 @compiled_from_zero
 def link_bytes(slot: int, cells: Cells, at: Layout) -> int:
     """Return the bytes that a packet has on the link of its hop."""
@@ -45,5 +52,5 @@ def link_bytes(slot: int, cells: Cells, at: Layout) -> int:
     plan = plan_of(cells[packet + HOP], cells, at)
     if cells[plan + HOP_SERVICE] != NONE:
         return cells[plan + HOP_BYTES]
-    port = at.ports + PORT_COLUMNS * cells[plan + HOP_PORT]
-    return cells[packet + IP_BYTES] + cells[port + OVERHEAD]
+    details = at.details + DETAILS * cells[plan + HOP_PORT]
+    return cells[packet + IP_BYTES] + cells[details + OVERHEAD]
