@@ -53,20 +53,17 @@ def compiled_from_zero(function: Function) -> Function:
     return _kept(function, IndicesFromZero) if IS_ON else function
 
 
-def _kept(function: Function, pipeline: type[CompilerBase]) -> Function:
-    options = {"nogil": True, "error_model": "numpy"}
+def inlined(function: Function) -> Function:
+    """Return `function` as `compiled_from_zero` does, put into its callers in place of a call."""
+    return _kept(function, IndicesFromZero, forceinline=True) if IS_ON else function
+
+
+def _kept(function: Function, pipeline: type[CompilerBase], **more: bool) -> Function:
+    options = {"nogil": True, "error_model": "numpy", "forceinline": False, **more}
     result: Any = Kernel(function, {}, {"nopython": True, "boundscheck": None, **options}, pipeline)
     result._cache = kernels.Kernels(function, f"{pipeline.__name__} {options}")
     kept: Function = result
     return kept
-
-
-def inlined(function: Function) -> Function:
-    """Return `function` as `compiled` does, put into each of its callers in place of a call."""
-    if not IS_ON:
-        return function
-    options = {"nogil": True, "error_model": "numpy", "inline": "always"}
-    return numba.njit(**options)(function)
 
 
 def first_class(functions: Sequence[Callable[..., None]], signature: Any) -> Any:
