@@ -22,7 +22,7 @@ from numba.core.environment import Environment
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.sigutils import normalize_signature
 
-from tieline import typing_memo
+from tieline.compiler_thrift import be_thrifty
 
 # numba has no type hints for these two.
 FunctionCompiler: Any = dispatcher._FunctionCompiler  # type: ignore[attr-defined]
@@ -124,7 +124,7 @@ def _translating() -> Iterator[Any]:
     """Have whatever numba compiles meanwhile only translated; yields who makes machine code."""
     codegen = cpu_target.target_context.codegen()
     with global_compiler_lock:
-        typing_memo.remember()
+        be_thrifty()
         before = codegen._library_class
         codegen._library_class = Translation
         try:
