@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled, compiled_in_place
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class Sensors(NamedTuple):
     pmus: int
 
 
-@compiled
+@compiled_in_place
 def filter_angles(sensors: Sensors, v: NDArray[np.complex128], x: Floats, dx: Floats) -> None:
     """Write the derivatives of the filters' states (2, m) from the bus voltages."""
     count = len(sensors.bus)
