@@ -7,7 +7,9 @@ takes in half of its strings. Together that was half of the time in which kernel
 Neither changes what is computed.
 """
 
-from collections.abc import Callable
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from numba.core import types
@@ -15,6 +17,9 @@ from numba.core.compiler import Flags
 from numba.core.extending import overload
 from numba.core.registry import cpu_target
 from numba.np import arrayobj
+
+COLLECT_AFTER = 100_000
+"""New objects after which Python looks for unreachable ones while it compiles; else some 700."""
 
 
 def be_thrifty() -> None:
@@ -25,6 +30,17 @@ def be_thrifty() -> None:
         options: Any = Flags
         options.__eq__, options.__hash__ = _equal, _hash
         arrayobj.raise_with_shape_context = raise_wrong_shape
+
+
+@contextmanager
+def seldom_collecting() -> Iterator[None]:
+    """Look for unreachable objects seldom meanwhile: of the many made, few can be freed so early."""
+    thresholds = gc.get_threshold()
+    gc.set_threshold(COLLECT_AFTER, *thresholds[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*thresholds)
 
 
 class _Remembered:
