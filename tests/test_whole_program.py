@@ -105,6 +105,22 @@ def test_a_list_of_functions_takes_those_that_call_others() -> None:
     assert y[0] == 9.0
 
 
+def test_a_function_is_translated_once_for_all_constants() -> None:
+    """Each place that writes a word of a frame would cost a first run a translation."""
+
+    @compiled_from_zero
+    def at(x, i):
+        return x[i]
+
+    @compiled
+    def difference(x):
+        return at(x, 2) - at(x, 1)
+
+    difference._cache = NullCache()
+    assert difference(np.arange(3.0)) == 1.0
+    assert len(at._inner.overloads) == 1
+
+
 def test_a_function_may_call_itself() -> None:
     """A user's model is free to."""
 

@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
+from numba.core.errors import TypingError
 from numba.core.extending import intrinsic
+from numba.core.types.containers import Tuple
 from numba.np.arrayobj import make_array
 
 from tieline import kernels
@@ -34,7 +36,7 @@ def caller(signature: Any) -> Any:
     """Return what calls one of some functions: (functions, number, arguments), for compiled code.
 
     The functions are those of `first_class` with the same signature, which returns nothing; the
-    arguments are a tuple, and converted to its types where numba can.
+    arguments are a tuple, of just its types.
     """
     return _compiled_caller(signature) if IS_ON else _call
 
@@ -44,17 +46,21 @@ def _call(functions: Any, number: int, arguments: tuple[Any, ...]) -> None:
 
 
 def _compiled_caller(signature: Any) -> Any:
+    taken = Tuple(signature.args)
+
     def emit(context: Any, builder: Any, typed: Any, values: Any) -> Any:
         addresses = make_array(typed.args[0])(context, builder, values[0])
         address = builder.load(builder.gep(addresses.data, [values[1]]))
-        taken = [context.get_value_type(argument) for argument in signature.args]
-        function = ir.FunctionType(context.get_value_type(signature.return_type), taken)
+        passed = [context.get_value_type(argument) for argument in signature.args]
+        function = ir.FunctionType(context.get_value_type(signature.return_type), passed)
         arguments = cgutils.unpack_tuple(builder, values[2])
         builder.call(builder.inttoptr(address, function.as_pointer()), arguments)
         return context.get_dummy_value()
 
     def call(typing_context: Any, functions: Any, number: Any, arguments: Any) -> Any:
-        return types.void(functions, types.intp, types.Tuple(signature.args)), emit
+        if arguments != taken:
+            raise TypingError(f"a function that takes {taken} is called with {arguments}")
+        return types.void(functions, types.intp, taken), emit
 
     # By its name it is told apart where compiled code is kept.
     call.__name__ = f"call of {signature}"

@@ -34,7 +34,7 @@ def be_thrifty() -> None:
 
 @contextmanager
 def seldom_collecting() -> Iterator[None]:
-    """Look for unreachable objects seldom meanwhile: of the many made, few can be freed so early."""
+    """Look for unreachable objects seldom meanwhile: of so many, few can be freed so early."""
     thresholds = gc.get_threshold()
     gc.set_threshold(COLLECT_AFTER, *thresholds[1:])
     try:

@@ -21,6 +21,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.environment import Environment
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.sigutils import normalize_signature
+from numba.core.types.misc import unliteral
 
 from tieline.compiler_thrift import be_thrifty, seldom_collecting
 
@@ -174,9 +175,9 @@ class Kernel(CPUDispatcher):
 def _without_constants(args: Any, kws: Any) -> tuple[tuple[Any, ...], dict[str, Any]]:
     """Return types of arguments with those of whole numbers in place of constants'."""
     return (
-        tuple(types.unliteral(arg) if isinstance(arg, types.Integer) else arg for arg in args),
+        tuple(unliteral(arg) if isinstance(arg, types.Integer) else arg for arg in args),
         {
-            name: types.unliteral(arg) if isinstance(arg, types.Integer) else arg
+            name: unliteral(arg) if isinstance(arg, types.Integer) else arg
             for name, arg in kws.items()
         },
     )

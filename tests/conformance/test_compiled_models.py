@@ -10,7 +10,6 @@ from tieline.by_address import caller, first_class
 from tieline.compiled import compiled
 from tieline.grid.models.base import SIGNATURE, Machine, Model
 
-
 call_of_model = caller(SIGNATURE)
 
 
