@@ -289,5 +289,5 @@ def load_network(factors: Factors, loads: LoadCurrents) -> LoadNetwork:
         unit = np.zeros(buses, np.complex128)
         unit[bus] = 1.0
         solve(factors, unit, scratch, v)
-        take(loads.bus, v, transfer[:, row])
+        transfer[:, row] = v[loads.bus].real, v[loads.bus].imag
     return LoadNetwork(loads.bus, load_laws(loads), transfer)
