@@ -6,7 +6,8 @@ import pytest
 from numba import types
 from numba.core.caching import NullCache
 
-from tieline.compiled import IS_ON, compiled, compiled_from_zero, first_class
+from tieline.by_address import caller, first_class
+from tieline.compiled import IS_ON, compiled, compiled_from_zero
 
 pytestmark = pytest.mark.skipif(not IS_ON, reason="the compiler is switched off")
 
@@ -36,9 +37,13 @@ def squared(x, y):
     y[0] = element(x, 0) ** 2
 
 
+signature = types.void(types.float64[::1], types.float64[::1])
+call = caller(signature)
+
+
 @compiled
 def called(functions, x, y):
-    functions[0](x, y)
+    call(functions, 0, (x, y))
 
 
 @numba.njit
@@ -89,16 +94,31 @@ def test_what_the_wrapper_needs_is_its_own() -> None:
 def test_an_error_within_reaches_python() -> None:
     """A shape that does not fit must be told, not written past the end of an array."""
     for _ in range(2):
-        with pytest.raises(ValueError, match="cannot assign slice of shape"):
+        with pytest.raises(ValueError, match="cannot assign to a slice"):
             outer(np.zeros(3), np.zeros(2))
 
 
 def test_a_list_of_functions_takes_those_that_call_others() -> None:
     """The models' equations are called through their addresses, and call blocks."""
-    signature = types.void(types.float64[::1], types.float64[::1])
     y = np.zeros(1)
     called(first_class([squared], signature), np.array([3.0]), y)
     assert y[0] == 9.0
+
+
+def test_a_function_is_translated_once_for_all_constants() -> None:
+    """Each place that writes a word of a frame would cost a first run a translation."""
+
+    @compiled_from_zero
+    def at(x, i):
+        return x[i]
+
+    @compiled
+    def difference(x):
+        return at(x, 2) - at(x, 1)
+
+    difference._cache = NullCache()
+    assert difference(np.arange(3.0)) == 1.0
+    assert len(at._inner.overloads) == 1
 
 
 def test_a_function_may_call_itself() -> None:

@@ -1,10 +1,8 @@
-"""Compiles code that looks up numbers in arrays that it is given, and makes none, for what it does.
+"""Compiles code that looks up numbers in arrays, for what it does.
 
 numba takes every signed index for one that may be negative and then counts from the end: two more
 instructions an index, for which every access waits. In the packet kernel, which does little else
-than look up whole numbers in tables, they were a third of all instructions. And numba counts who
-holds an array, with instructions that lock the memory, wherever a function with a loop or a call is
-put into its caller: a fifth of the kernel's time. The caller holds every array meanwhile.
+than look up whole numbers in tables, they were a third of all instructions.
 """
 
 from typing import Any
@@ -17,24 +15,10 @@ from numba.core.untyped_passes import InlineInlinables
 
 
 class IndicesFromZero(CompilerBase):
-    """numba's compiler, which takes every index as not negative and counts no references.
+    """numba's compiler, which takes every index as not negative.
 
-    A slice is no index of an element: functions with slices are not for this compiler. Neither are
-    functions that make arrays, which it refuses.
+    A slice is no index of an element: functions with slices are not for this compiler.
     """
-
-    def __init__(
-        self,
-        typingctx: Any,
-        targetctx: Any,
-        library: Any,
-        args: Any,
-        return_type: Any,
-        flags: Any,
-        locals: Any,
-    ) -> None:
-        flags.nrt = False
-        super().__init__(typingctx, targetctx, library, args, return_type, flags, locals)
 
     def define_pipelines(self) -> list[Any]:
         """Return the one pipeline."""

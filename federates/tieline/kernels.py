@@ -39,7 +39,7 @@ MOST_VERSIONS = 16
 SETTINGS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")
 """What numba's environment variables change about code."""
 
-MAKERS = ("indices.py", "prefetch.py", "whole_program.py")
+MAKERS = ("by_address.py", "compiler_thrift.py", "indices.py", "prefetch.py", "whole_program.py")
 """Files beside this one that change what numba makes of a function."""
 
 

@@ -13,7 +13,7 @@ from copy import copy
 from typing import Any
 
 from llvmlite.binding import Linkage
-from numba.core import dispatcher
+from numba.core import dispatcher, types
 from numba.core.ccallback import CFunc
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompilerBase, CompileResult
@@ -21,6 +21,9 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.environment import Environment
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.sigutils import normalize_signature
+from numba.core.types.misc import unliteral
+
+from tieline.compiler_thrift import be_thrifty, seldom_collecting
 
 # numba has no type hints for these two.
 FunctionCompiler: Any = dispatcher._FunctionCompiler  # type: ignore[attr-defined]
@@ -121,7 +124,8 @@ def _callers_first(library: Any) -> list[Any]:
 def _translating() -> Iterator[Any]:
     """Have whatever numba compiles meanwhile only translated; yields who makes machine code."""
     codegen = cpu_target.target_context.codegen()
-    with global_compiler_lock:
+    with global_compiler_lock, seldom_collecting():
+        be_thrifty()
         before = codegen._library_class
         codegen._library_class = Translation
         try:
@@ -156,13 +160,27 @@ class Kernel(CPUDispatcher):
         return self._inner.is_compiling
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Return what a compiled caller needs to know of the types, and translate the function."""
+        """Return what a compiled caller needs to know of the types, and translate the function.
+
+        A constant is passed as a number: numba would translate the function anew for each.
+        """
         with _translating():
-            return self._inner.get_call_template(args, kws)
+            return self._inner.get_call_template(*_without_constants(args, kws))
 
     def get_overload(self, sig: Any) -> Any:
         """Return what stands for the translation in compiled callers."""
         return self._inner.get_overload(sig)
+
+
+def _without_constants(args: Any, kws: Any) -> tuple[tuple[Any, ...], dict[str, Any]]:
+    """Return types of arguments with those of whole numbers in place of constants'."""
+    return (
+        tuple(unliteral(arg) if isinstance(arg, types.Integer) else arg for arg in args),
+        {
+            name: unliteral(arg) if isinstance(arg, types.Integer) else arg
+            for name, arg in kws.items()
+        },
+    )
 
 
 class _Whole(FunctionCompiler):

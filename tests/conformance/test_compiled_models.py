@@ -6,15 +6,18 @@ import numpy as np
 import pytest
 
 from conformance.examples import ALL_MODELS, parameters, signals
-from tieline.compiled import compiled, first_class
+from tieline.by_address import caller, first_class
+from tieline.compiled import compiled
 from tieline.grid.models.base import SIGNATURE, Machine, Model
+
+call_of_model = caller(SIGNATURE)
 
 
 @compiled
 def call(
     functions: Any, x: np.ndarray, u: np.ndarray, p: np.ndarray, dx: np.ndarray, y: np.ndarray
 ) -> None:
-    functions[0](x, u, p, dx, y)
+    call_of_model(functions, 0, (x, u, p, dx, y))
 
 
 @pytest.mark.parametrize("model", ALL_MODELS, ids=lambda model: model.key)

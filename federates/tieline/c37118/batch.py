@@ -22,7 +22,7 @@ from tieline.c37118.constants import (
 from tieline.c37118.crc import crc_of_rows
 from tieline.c37118.prefix import Prefix
 from tieline.c37118.timestamp import soc_fracsec
-from tieline.compiled import compiled
+from tieline.compiled import compiled, compiled_in_place
 from tieline.errors import InputError
 from tieline.units import NS_PER_S
 
@@ -232,7 +232,7 @@ def _read(
     return verdicts, idcodes, tags_ns, f_hz
 
 
-@compiled
+@compiled_in_place
 def _judge(row: NDArray[np.uint8], crc: int) -> int:
     """Return the `Verdict` on a frame (34,) whose bytes have a CRC."""
     sync = _word(row, _SYNC_AT)
@@ -249,32 +249,32 @@ def _judge(row: NDArray[np.uint8], crc: int) -> int:
     return _SOUND
 
 
-@compiled
+@compiled_in_place
 def _word(row: NDArray[np.uint8], at: int) -> int:
     """Return the two bytes at a place as the number that they send."""
     return int(row[at]) << 8 | int(row[at + 1])
 
 
-@compiled
+@compiled_in_place
 def _long(row: NDArray[np.uint8], at: int) -> int:
     """Return the four bytes at a place as the number that they send."""
     return _word(row, at) << 16 | _word(row, at + 2)
 
 
-@compiled
+@compiled_in_place
 def _put(row: NDArray[np.uint8], at: int, value: int) -> None:
     """Write the low two bytes of a number at a place."""
     row[at], row[at + 1] = (value >> 8) & 0xFF, value & 0xFF
 
 
-@compiled
+@compiled_in_place
 def _put_long(row: NDArray[np.uint8], at: int, value: int) -> None:
     """Write the low four bytes of a number at a place."""
     _put(row, at, value >> 16)
     _put(row, at + 2, value)
 
 
-@compiled
+@compiled_in_place
 def _put_float(row: NDArray[np.uint8], at: int, value: float) -> None:
     """Write a number at a place in single precision."""
     _put_long(row, at, int(np.float32(value).view(np.uint32)))

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled_in_place
 from tieline.cosim.interfaces import GRID, Clock, DeliveryBundle
 from tieline.errors import CosimError, TimeContractBroken
 from tieline.units import NS_PER_S, ns_to_seconds
@@ -111,7 +111,7 @@ def check_stamps(name: str, clock: Clock, k: int, arrivals_ns: NDArray[np.intege
         )
 
 
-@compiled
+@compiled_in_place
 def _fault(
     arrival_ns: Numbers,
     source: Numbers,

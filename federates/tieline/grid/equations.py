@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.by_address import caller
+from tieline.compiled import compiled_in_place
 from tieline.grid.loads import settle
-from tieline.grid.models.base import SIGNALS
+from tieline.grid.models.base import SIGNALS, SIGNATURE
 from tieline.grid.plan import HELD, SENSORS, Average, Jobs, Plan, Work
 from tieline.grid.sensors import Sensors, filter_angles
 
@@ -16,8 +17,10 @@ Floats = NDArray[np.float64]
 OMEGA, V_RE, V_IM, VT = (SIGNALS.index(name) for name in ("omega", "v_re", "v_im", "vt"))
 EPP_RE, EPP_IM, WBAR = (SIGNALS.index(name) for name in ("Epp_re", "Epp_im", "wbar"))
 
+call = caller(SIGNATURE)
 
-@compiled
+
+@compiled_in_place
 def run_job(functions: Any, jobs: Jobs, work: Work, j: int, x: Floats, dx: Floats) -> None:
     """Evaluate job `j`: gather its inputs, call its equation, scatter its outputs."""
     n, states, rows = jobs.n[j], jobs.n_states[j], jobs.n_parameters[j]
@@ -32,13 +35,13 @@ def run_job(functions: Any, jobs: Jobs, work: Work, j: int, x: Floats, dx: Float
     for i in range(last_in - first_in):
         for unit in range(n):
             u[i, unit] = work.signals[jobs.inputs[first_in + i], units[unit]]
-    functions[jobs.function[j]](x_j, u, p_j, dx_j, y)
+    call(functions, jobs.function[j], (x_j, u, p_j, dx_j, y))
     for i in range(last_out - first_out):
         for unit in range(n):
             work.signals[jobs.outputs[first_out + i], units[unit]] = y[i, unit]
 
 
-@compiled
+@compiled_in_place
 def solve_network(plan: Plan, work: Work) -> bool:
     """Write all bus voltages for the machines' sources; return whether the loads converged."""
     signals = work.signals
@@ -53,7 +56,7 @@ def solve_network(plan: Plan, work: Work) -> bool:
     return converged
 
 
-@compiled
+@compiled_in_place
 def follow_frequency(plan: Plan, work: Work, x: Floats) -> None:
     """Write how much more (or less) each load draws at the frequency of its own bus."""
     loads, sensors = plan.loads, plan.sensors
@@ -65,7 +68,7 @@ def follow_frequency(plan: Plan, work: Work, x: Floats) -> None:
             work.load_factor[1, k] = 1.0 + loads.q_frequency[k] * deviation
 
 
-@compiled
+@compiled_in_place
 def show_voltages(plan: Plan, work: Work) -> None:
     """Write the bus voltages of `work` as the signals of its units."""
     signals = work.signals
@@ -74,7 +77,7 @@ def show_voltages(plan: Plan, work: Work) -> None:
         signals[V_RE, i], signals[V_IM, i], signals[VT, i] = v.real, v.imag, abs(v)
 
 
-@compiled
+@compiled_in_place
 def average_now(average: Average, sensors: Sensors, x: Floats) -> float:
     """Return wbar as the states of `x` give it, pu; exactly 1 at rest."""
     total = 0.0
@@ -88,7 +91,7 @@ def average_now(average: Average, sensors: Sensors, x: Floats) -> float:
     return 1.0 + total
 
 
-@compiled
+@compiled_in_place
 def rhs(functions: Any, plan: Plan, work: Work, x: Floats, dx: Floats) -> bool:
     """Write dx/dt and every signal at `x`; return whether the network was solved.
 
@@ -108,7 +111,7 @@ def rhs(functions: Any, plan: Plan, work: Work, x: Floats, dx: Floats) -> bool:
     return solved
 
 
-@compiled
+@compiled_in_place
 def rhs_at_voltages(functions: Any, plan: Plan, work: Work, x: Floats, dx: Floats) -> None:
     """Write dx/dt and every signal at `x`, with the voltages and wbar as they stand in `work`."""
     for j in range(len(plan.jobs.function)):

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled_in_place
 from tieline.grid.anti_windup import stop_at_limit
 from tieline.grid.equations import WBAR, average_now, rhs
 from tieline.grid.plan import HELD, Plan, Work
@@ -57,7 +57,14 @@ MOVED = 1e-9
 """Least motion in a step of a state that is taken to run into a limit."""
 
 
-@compiled
+@compiled_in_place
+def set_to(x: Floats, values: Floats) -> None:
+    """Write values (n,) into states (n,)."""
+    for i in range(len(x)):
+        x[i] = values[i]
+
+
+@compiled_in_place
 def add(x: Floats, share: float, rates: Floats) -> None:
     """Add a share (s) of some rates to states, in place; nothing where the share is 0."""
     if share != 0.0:
@@ -65,7 +72,7 @@ def add(x: Floats, share: float, rates: Floats) -> None:
             x[i] += share * rates[i]
 
 
-@compiled
+@compiled_in_place
 def is_finite(x: Floats) -> bool:
     """Return whether every state is a finite number."""
     total = 0.0
@@ -74,7 +81,7 @@ def is_finite(x: Floats) -> bool:
     return total == 0.0
 
 
-@compiled
+@compiled_in_place
 def advance(
     functions: Any,
     plan: Plan,
@@ -107,7 +114,7 @@ def advance(
     for now in range(tick, tick + steps):
         hear(averages, now, work.signals[WBAR])
         for stage in range(stages):
-            at_stage[:] = x
+            set_to(at_stage, x)
             for earlier in range(stage):
                 add(at_stage, h * method.a[stage, earlier], k[earlier])
             if is_late:
@@ -120,7 +127,7 @@ def advance(
                 for i in range(len(x)):
                     if k[0, i] == 0.0 and abs(x[i] - before[i]) > MOVED:
                         return now, AT_LIMIT
-        before[:] = x
+        set_to(before, x)
         for stage in range(stages):
             add(x, h * method.b[stage], k[stage])
         if not is_finite(x):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled, compiled_in_place
 from tieline.grid.case import Case
 from tieline.grid.network import Factors, solve
 from tieline.grid.powerflow import PowerFlow
@@ -126,7 +126,7 @@ def load_laws(loads: LoadCurrents) -> Floats:
     )
 
 
-@compiled
+@compiled_in_place
 def corrections(
     laws: Floats, factor: Floats, stays_low: NDArray[np.bool_], v: Floats, current: Floats
 ) -> None:
@@ -150,10 +150,12 @@ def corrections(
         current[1, k] = g * v[1, k] + b * v[0, k]
 
 
-@compiled
+@compiled_in_place
 def sweep_reduced(transfer: Floats, v_open: Floats, current: Floats, v: Floats) -> None:
     """Write the loads' voltages (2, m) for currents (2, m): v_open + Z current."""
-    v[:] = v_open
+    for row in range(2):
+        for k in range(v.shape[1]):
+            v[row, k] = v_open[row, k]
     for other in range(v.shape[1]):
         re, im = current[0, other], current[1, other]
         for k in range(v.shape[1]):
@@ -161,21 +163,21 @@ def sweep_reduced(transfer: Floats, v_open: Floats, current: Floats, v: Floats) 
             v[1, k] += transfer[0, other, k] * im + transfer[1, other, k] * re
 
 
-@compiled
+@compiled_in_place
 def inject(bus: NDArray[np.int64], current: Floats, source: Complexes) -> None:
     """Add currents (2, m) at their buses to the injected currents (buses,)."""
     for k in range(len(bus)):
         source[bus[k]] += complex(current[0, k], current[1, k])
 
 
-@compiled
+@compiled_in_place
 def take(bus: NDArray[np.int64], v: Complexes, at: Floats) -> None:
     """Write real and imaginary part of the voltages of some buses into `at` (2, m)."""
     for k in range(len(bus)):
         at[0, k], at[1, k] = v[bus[k]].real, v[bus[k]].imag
 
 
-@compiled
+@compiled_in_place
 def moved(v: Floats, earlier: Floats) -> float:
     """Return the largest change of a component between voltages (2, m); NaN counts as endless."""
     largest = 0.0
@@ -187,7 +189,7 @@ def moved(v: Floats, earlier: Floats) -> float:
     return largest
 
 
-@compiled
+@compiled_in_place
 def hasten(v: Floats, swept: Floats, last_move: Floats, last_swept: Floats, is_first: bool) -> None:
     """Write where the next sweep starts into `v`, from what this one made of it, all (2, m).
 
@@ -287,5 +289,5 @@ def load_network(factors: Factors, loads: LoadCurrents) -> LoadNetwork:
         unit = np.zeros(buses, np.complex128)
         unit[bus] = 1.0
         solve(factors, unit, scratch, v)
-        take(loads.bus, v, transfer[:, row])
+        transfer[:, row] = v[loads.bus].real, v[loads.bus].imag
     return LoadNetwork(loads.bus, load_laws(loads), transfer)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled_in_place
 from tieline.errors import NumericalError
 from tieline.grid.case import Branches, Buses
 
@@ -101,7 +101,7 @@ def factorise(matrix: sparse.csc_matrix) -> Factors:
     )
 
 
-@compiled
+@compiled_in_place
 def solve(factors: Factors, current: Complexes, scratch: Complexes, v: Complexes) -> None:
     """Write the voltages (n,) that belong to the injected currents (n,); `scratch` is (n,)."""
     count = len(current)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled_in_place
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class Sensors(NamedTuple):
     pmus: int
 
 
-@compiled
+@compiled_in_place
 def filter_angles(sensors: Sensors, v: NDArray[np.complex128], x: Floats, dx: Floats) -> None:
     """Write the derivatives of the filters' states (2, m) from the bus voltages."""
     count = len(sensors.bus)
@@ -57,7 +57,6 @@ def filter_angles(sensors: Sensors, v: NDArray[np.complex128], x: Floats, dx: Fl
         dx[z2] = B * gap - A1 * x[z2]
 
 
-@compiled
 def frequencies(sensors: Sensors, x: Floats) -> Floats:
     """Return (pmus,) the frequencies that the PMUs show, Hz."""
     first = sensors.x0 + len(sensors.bus)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import first_class
+from tieline.by_address import first_class
 from tieline.errors import NumericalError
 from tieline.grid.case import Case
 from tieline.grid.devices import Group, groups

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled_in_place
 from tieline.grid.plan import Work
 from tieline.grid.sensors import Sensors
 from tieline.grid.stability import ANGLE_RAD, SPEED_PU
@@ -43,7 +43,7 @@ class Watch(NamedTuple):
     noted: Integers
 
 
-@compiled
+@compiled_in_place
 def centre_of_inertia(watch: Watch, x: Floats) -> float:
     """Return the speed of the units in service, weighted by stored energy, pu.
 
@@ -56,7 +56,7 @@ def centre_of_inertia(watch: Watch, x: Floats) -> float:
     return 1.0 + deviation / total if total > 0.0 else 1.0
 
 
-@compiled
+@compiled_in_place
 def has_lost(watch: Watch, x: Floats, tick: int) -> bool:
     """Return whether a unit in service is lost at `tick`, as `stability.lost` says; if looked."""
     if tick % watch.per_look != 0:
@@ -73,7 +73,7 @@ def has_lost(watch: Watch, x: Floats, tick: int) -> bool:
     return False
 
 
-@compiled
+@compiled_in_place
 def write_row(watch: Watch, sensors: Sensors, work: Work, x: Floats, tick: int) -> None:
     """Add the row of a tick whose signals and voltages stand in `work`."""
     row = watch.rows[watch.noted[0]]
@@ -94,7 +94,7 @@ def write_row(watch: Watch, sensors: Sensors, work: Work, x: Floats, tick: int) 
     watch.noted[1] = tick
 
 
-@compiled
+@compiled_in_place
 def note(watch: Watch, sensors: Sensors, work: Work, x: Floats, tick: int) -> None:
     """Add the row of a tick if one is due, once."""
     if watch.per_row > 0 and tick % watch.per_row == 0 and tick > watch.noted[1]:

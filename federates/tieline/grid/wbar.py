@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled_in_place
 
 Floats = NDArray[np.float64]
 
@@ -33,15 +33,16 @@ def no_averages(delay_steps: int, units: int) -> Averages:
     return Averages(past, np.empty(0, np.int64), np.empty((0, units)))
 
 
-@compiled
+@compiled_in_place
 def hear(averages: Averages, tick: int, believed: Floats) -> None:
     """Write what is due at a tick into the averages (units,) that are believed."""
     for i in range(len(averages.due)):
         if averages.due[i] == tick:
-            believed[:] = averages.told[i]
+            for unit in range(len(believed)):
+                believed[unit] = averages.told[i, unit]
 
 
-@compiled
+@compiled_in_place
 def late_average(past: Floats, tick: int, delay: int, half: int) -> float:
     """Return the average `delay` steps before `tick` (plus `half` half steps).
 

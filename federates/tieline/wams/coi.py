@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tieline.c37118.batch import Verdict, checked_idcodes, read_frames
-from tieline.compiled import compiled
+from tieline.compiled import compiled_in_place
 from tieline.errors import CosimError, InputError
 from tieline.units import NS_PER_S
 
@@ -243,7 +243,7 @@ class WideAreaAverage:
         return np.maximum(now_ns - np.maximum(self._tag_ns, 0), 0)
 
 
-@compiled
+@compiled_in_place
 def _first_early(
     payload_row: NDArray[np.int64],
     arrivals_ns: NDArray[np.int64],
@@ -258,7 +258,7 @@ def _first_early(
     return -1
 
 
-@compiled
+@compiled_in_place
 def _keep_newest(
     destination: NDArray[np.int64],
     payload_row: NDArray[np.int64],
@@ -305,7 +305,7 @@ def _keep_newest(
     return -1
 
 
-@compiled
+@compiled_in_place
 def _average(
     f_hz: NDArray[np.float64],
     alpha: NDArray[np.float64],

@@ -6,7 +6,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from tieline.compiled import compiled
+from tieline.compiled import compiled_in_place
 from tieline.grid.models.base import Array, Equation, Machine, Parameter, indices
 
 PARAMETERS: tuple[Parameter, ...] = (
@@ -31,7 +31,7 @@ P = indices(PARAMETERS)
 X = indices(STATES)
 
 
-@compiled
+@compiled_in_place
 def fluxes(x: Array, p: Array) -> tuple[float, float]:
     """Return psi''_d and psi''_q of one unit with states `x` (states,), parameters `p`."""
     share_d = (p[P.xd_pp] - p[P.xl]) / (p[P.xd_p] - p[P.xl])
@@ -41,7 +41,7 @@ def fluxes(x: Array, p: Array) -> tuple[float, float]:
     return psi_d, psi_q
 
 
-@compiled
+@compiled_in_place
 def currents(
     x: Array, v_d: float, v_q: float, p: Array, psi_d: float, psi_q: float
 ) -> tuple[float, float]:
@@ -53,7 +53,7 @@ def currents(
     return (ra * d_d + xpp * d_q) / square, (ra * d_q - xpp * d_d) / square
 
 
-@compiled
+@compiled_in_place
 def field_current(x: Array, p: Array, i_d: float) -> float:
     """Return I_fd = E'_q + (x_d - x'_d) [i_d + (x'_d - x'') / (x'_d - x_l)^2 e_a] of one unit."""
     span = p[P.xd_p] - p[P.xl]
@@ -85,7 +85,7 @@ def electrical(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
         terminals(x[:, i], u[:, i], p[:, i], y[:, i])
 
 
-@compiled
+@compiled_in_place
 def terminals(x: Array, u: Array, p: Array, y: Array) -> None:
     """Write one unit's terminal power, field current and terminal current."""
     psi_d, psi_q = fluxes(x, p)
@@ -103,7 +103,7 @@ def motion(x: Array, u: Array, p: Array, dx: Array, y: Array) -> None:
         move(x[:, i], u[:, i], p[:, i], dx[:, i])
 
 
-@compiled
+@compiled_in_place
 def move(x: Array, u: Array, p: Array, dx: Array) -> None:
     """Write the derivatives of one unit's rotor and fluxes."""
     psi_d, psi_q = fluxes(x, p)
