@@ -6,10 +6,10 @@ from typing import Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from matplotlib.image import imsave
 
 from tieline.figures.both import Both, BothCanvas
 from tieline.figures.panels import Panel, PanelFigure
-from tieline.figures.png import write_png
 from tieline.figures.scales import POINTS_PER_INCH
 
 __all__ = [
@@ -44,6 +44,9 @@ COLOURS = ("viridis", 0.12, 0.88)
 
 PANEL_INCHES = (6.3, 3.2)
 
+_COMPRESSION = 3
+"""Of a PNG; the usual 6 takes one and a half times as long for files a tenth smaller."""
+
 
 def colours(count: int) -> list[Any]:
     """Return `count` colours of the sequence."""
@@ -73,4 +76,4 @@ def _draw(figure: Figure, path: Path) -> None:
         BothCanvas(figure, renderer)
         figure.draw(renderer)
         renderer.finish()
-    write_png(path, renderer.pixels(), dots_per_inch)
+    imsave(path, renderer.pixels(), dpi=dots_per_inch, pil_kwargs={"compress_level": _COMPRESSION})
