@@ -56,7 +56,9 @@ def test_the_png_is_what_matplotlib_draws_alone(saved: Path) -> None:
     figure.draw(canvas.get_renderer())
     alone = np.asarray(canvas.buffer_rgba()) / 255
     drawn = matplotlib.image.imread(saved / "all.png")
-    assert drawn.shape == alone.shape
+    # matplotlib before 3.11 leaves out what is less than a whole dot.
+    assert np.abs(np.subtract(drawn.shape, alone.shape)).max() <= 1
+    drawn = drawn[: len(alone)]
     # Letters are a hundredth of the picture; their places differ by less than a dot.
     assert np.mean(np.abs(drawn - alone).max(axis=2) > 0.3) < 0.01
 
