@@ -1,5 +1,7 @@
 """What commands say: text as it is, and an error as its message with its exit code."""
 
+import signal
+import threading
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -48,7 +50,21 @@ def reporting(debug: bool = False) -> Iterator[None]:
 
 
 def _complain(message: str, debug: bool) -> None:
-    console = console_of(stderr=True)
-    if debug:
-        console.print(traceback.format_exc(), markup=False, highlight=False, soft_wrap=True)
-    console.print(message, markup=False, highlight=False, soft_wrap=True)
+    with _deaf_to_interrupts():
+        console = console_of(stderr=True)
+        if debug:
+            console.print(traceback.format_exc(), markup=False, highlight=False, soft_wrap=True)
+        console.print(message, markup=False, highlight=False, soft_wrap=True)
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Let no further Ctrl-C stop the last words of a command: it ends with them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

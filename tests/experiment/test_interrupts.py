@@ -4,7 +4,10 @@ import os
 import signal
 
 import pytest
+import typer
+from rich.console import Console
 
+from tieline import console
 from tieline.experiment.interrupts import current_interrupts, interruptible
 
 
@@ -22,6 +25,42 @@ def test_only_the_first_of_several_signals_interrupts() -> None:
         press()
         press(signal.SIGTERM)
         assert interrupts.is_hurried
+
+
+class Careless:
+    """Is interrupted where Python drops what is raised."""
+
+    def __del__(self) -> None:
+        press()
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_what_goes_on_in_spite_of_a_signal_is_interrupted_again() -> None:
+    """If not, Ctrl-C in the wrong microsecond would be lost, and all that follow with it."""
+    with interruptible() as interrupts:
+        interrupts.insist()
+        Careless()
+        with pytest.raises(KeyboardInterrupt):
+            interrupts.insist()
+
+
+def test_the_last_words_of_a_command_are_not_interrupted(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """If not, Ctrl-C twice would end in a traceback."""
+    import_of_rich = console.console_of
+
+    def slow(stderr: bool) -> Console:
+        press()
+        return import_of_rich(stderr=stderr)
+
+    monkeypatch.setattr(console, "console_of", slow)
+    with pytest.raises(typer.Exit) as end, console.reporting():
+        raise KeyboardInterrupt
+    assert end.value.exit_code == console.INTERRUPTED
+    assert capsys.readouterr().err == "interrupted\n"
+    with pytest.raises(KeyboardInterrupt):
+        press()
 
 
 def save(done: list[str]) -> None:

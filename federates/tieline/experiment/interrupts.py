@@ -30,6 +30,14 @@ class Interrupts:
         self._has_raised = True
         raise KeyboardInterrupt
 
+    def insist(self) -> None:
+        """Interrupt again what goes on in spite of a signal.
+
+        Python drops whatever is raised while it calls back from an import or a finaliser.
+        """
+        if self._has_raised:
+            raise KeyboardInterrupt
+
     @contextmanager
     def hold(self) -> Iterator[None]:
         """Let nothing interrupt what is inside; a signal that came interrupts at its end."""

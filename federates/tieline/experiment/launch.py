@@ -217,6 +217,7 @@ class Processes:
         before_s = time.monotonic()
         while any(child.exit_code is None for child in self._children.values()):
             self._wait()
+            self._interrupts.insist()
             self._start_guests()
             now_s = time.monotonic()
             self._watch.pass_time(now_s - before_s)
