@@ -3,7 +3,7 @@
 Each command is a process of its own, as a user starts it; wall time and the processor time of it
 with all its children. A first run has an empty cache of compiled code.
 
-    .venv/bin/python benchmarks/startup.py [--repeat 5] [--cold 1] [--json FILE]
+    .venv/bin/python benchmarks/startup.py [--repeat 5] [--cold 3] [--json FILE]
 """
 
 import argparse
@@ -99,7 +99,7 @@ def main() -> None:
     """Measure, print, and write the rows where asked."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeat", type=int, default=5)
-    parser.add_argument("--cold", type=int, default=1)
+    parser.add_argument("--cold", type=int, default=3)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:

@@ -3,7 +3,7 @@
 The same points are run with one job and with two, alternately; wall time and processor time of the
 whole command. Points are of 4 s, each with a delay of its own.
 
-    .venv/bin/python benchmarks/sweep.py [--points 100] [--repeat 1] [--json FILE]
+    .venv/bin/python benchmarks/sweep.py [--points 100] [--repeat 2] [--json FILE]
 """
 
 import argparse
@@ -42,7 +42,7 @@ def main() -> None:
     """Measure, print, and write the rows where asked."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--points", type=int, default=100)
-    parser.add_argument("--repeat", type=int, default=1)
+    parser.add_argument("--repeat", type=int, default=2)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     taken: dict[int, list[Sample]] = {1: [], 2: []}
